@@ -36,8 +36,8 @@ test-hil: build ## hardware in the loop: a plugged bridge, a base: BASE=port [MO
 mutants: build ## change COUNT=300 lines at random, one at a time, and count what the tests notice; hours, resumable; SEED=n
 	@PYTHONPATH=tests $(PYTHON) -m mutants --count $(COUNT) --seed $(SEED)
 
-bench: build ## measure speed and accuracy again, as ratios in one run: bench/results, docs/charts
-	@$(PYTHON) tools/benches --build-dir $(BUILD)
+bench: build ## measure speed and accuracy again, resumable: bench/results, docs/charts; WHOLE=1: full sizes, many hours
+	@$(PYTHON) tools/benches --build-dir $(BUILD) $(if $(WHOLE),--whole)
 
 wheels: build ## Python wheels into dist/: abi3 for x86-64 and aarch64, and the simulation's programs
 	@$(PYTHON) tools/wheels --build-dir $(BUILD)

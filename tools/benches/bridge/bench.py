@@ -9,6 +9,7 @@ import json
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -30,6 +31,7 @@ from whisker_protocol import FRAME_BYTES, LIMITS  # noqa: E402
 
 SWEPT = "colorlight_i9"  # the chart of resources over lanes
 COUNTS = (28, 12, 1, 14, 6)  # of lanes; what is asked for most often comes first
+PROCESSES = 2  # of place and route, each of one thread
 TRIES = 8  # seeds, as build.py tries them
 PACES = (4000, 2000, 1000, 600, 530, 522, 521, 520, 519, 518, 517, 516)  # cycles from tick to tick
 PACED_TICKS = 2000
@@ -73,8 +75,10 @@ def fabric(placements: int) -> dict:
     left = [placements]
     jobs = [(name, lanes) for lanes in COUNTS for name in boards.boards()]
     found = {name: [] for name in boards.boards()}
-    for name, lanes in tqdm(jobs, desc="place and route", unit="build"):
-        found[name].append(default_build(name, lanes, left) or {"lanes": lanes})
+    with ThreadPoolExecutor(PROCESSES) as pool:
+        builds = tqdm(pool.map(lambda job: default_build(*job, left), jobs), "place and route", len(jobs), unit="build")
+        for (name, lanes), build in zip(jobs, builds, strict=True):
+            found[name].append(build or {"lanes": lanes})
     return {"boards": {name: facts(name, runs) for name, runs in found.items()}}
 
 
