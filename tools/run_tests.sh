@@ -34,6 +34,10 @@ if [ "${1:-}" = --long ]; then
     build/release/sim/bridge/tests/test_bridge_levels 4000 2
     echo "test: the node's image, ten thousand ticks, each step of an update"
     WHISKER_BUILD=build/release WHISKER_IMAGE_LONG=1 .venv/bin/python -m pytest --quiet sim/node_image
+    if command -v doxygen >/dev/null; then
+        echo "test: the site of pages and API"
+        (cd tools && ../.venv/bin/python -m handbook)
+    fi
     echo "test: mutated recordings"
     .venv/bin/python host/python/tests/fuzz.py recording --inputs 300000
     echo "test: a Linux kernel and the simulated bridge"
