@@ -30,7 +30,7 @@ PACKAGES = (
 COMPILED = """
 cd /build/src/host/examples
 for source in *.c; do cc -o /tmp/example $source $(pkg-config --cflags --libs whisker whisker-nav whisker-create) -lm; done
-for source in *.cpp; do c++ -std=c++17 -o /tmp/example $source $(pkg-config --cflags --libs whisker-nav); done
+for source in *.cpp; do c++ -std=c++17 -o /tmp/example $source $(pkg-config --cflags --libs whisker whisker-nav); done
 """
 # In an empty root.
 TRIED = """
