@@ -27,6 +27,7 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
     "host": "host.bench",
     "image": "node.image",
     "levels": "bridge.levels",
+    "map": "nav.maps",
     "mechanics": "mechanics.bench",
     "nav": "nav.bench",
     "nav_paper": "nav.paper",
@@ -49,6 +50,7 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
 }
 # Options of the topics whose full size takes more than some minutes, as `make bench` gives them.
 ROUND = {
+    "map": ["--seeds", "8"],
     "nav": ["--seeds", "20"],
     "nav_peers": ["--seeds", "20"],
     "nav_size": ["--seeds", "10"],

@@ -236,6 +236,7 @@ STUDIES = {  # page, what it holds
     "results/robot.md": "the whole robot: levels of simulation, half an hour, odometry, latency, instructions",
     "results/nav.md": "navigation: every filter, fault by fault; locks, bounds, cost",
     "results/nav_unseen.md": "families of scenes that no filter was made for",
+    "results/map.md": "an unknown arena: a map by touch alone, and the pose in it",
     "results/nav_size.md": "a start unknown, by the size of the arena",
     "results/nav_normals.md": "what the direction of a touched surface is worth",
     "results/nav_paper.md": "the paper's navigation figures, repeated",

@@ -36,6 +36,7 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tools/benches host": (("host",), ("host_cable", "host_clock")),
     "tools/benches image": (("node_image",), ()),
     "tools/benches levels": (("levels",), ("levels_speed",)),
+    "tools/benches map": (("map",), ("map",)),
     "tools/benches mechanics": (
         ("mechanics", "mechanics_edges"),
         ("mechanics_edges", "mechanics_moment", "mechanics_speed"),

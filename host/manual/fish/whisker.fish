@@ -259,9 +259,10 @@ complete -c whisker -n '__fish_seen_subcommand_from scene; and __fish_seen_subco
 complete -c whisker -n '__fish_seen_subcommand_from scene; and __fish_seen_subcommand_from map' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from scene; and __fish_seen_subcommand_from map' -l help -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from scene; and __fish_seen_subcommand_from map' -l out -d 'folder to write' -r
-complete -c whisker -n '__fish_seen_subcommand_from bench; and not __fish_seen_subcommand_from touch' -s h -d 'show this help message and exit'
-complete -c whisker -n '__fish_seen_subcommand_from bench; and not __fish_seen_subcommand_from touch' -l help -d 'show this help message and exit'
-complete -c whisker -n '__fish_seen_subcommand_from bench; and not __fish_seen_subcommand_from touch' -f -a touch -d 'where the robot is, by touch'
+complete -c whisker -n '__fish_seen_subcommand_from bench; and not __fish_seen_subcommand_from touch map' -s h -d 'show this help message and exit'
+complete -c whisker -n '__fish_seen_subcommand_from bench; and not __fish_seen_subcommand_from touch map' -l help -d 'show this help message and exit'
+complete -c whisker -n '__fish_seen_subcommand_from bench; and not __fish_seen_subcommand_from touch map' -f -a touch -d 'where the robot is, by touch'
+complete -c whisker -n '__fish_seen_subcommand_from bench; and not __fish_seen_subcommand_from touch map' -f -a map -d 'a map by touch alone, and the poses that it was made with'
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l help -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l list -d 'print the scenes of the list and leave'
@@ -274,6 +275,15 @@ complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subco
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l chart -d 'draw error and bits over the way, as SVG or PNG' -r
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l peers -d 'stored figures of other engines' -r
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l json -d 'print the scores as one line of JSON'
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -s h -d 'show this help message and exit'
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l help -d 'show this help message and exit'
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l scene -d 'a family of scenes (see whisker scene make --list), or a scene folder with true poses (default: anchor)' -x
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l seed -d 'of a family'\''s scene (default: 1)' -x
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l rows -d 'of a family'\''s scene (default: 3000)' -x
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l estimate -d 'judge these poses, in the frame of the first one, of any engine (docs/formats.md), in place of whisker map'\''s' -r
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l particles -d 'as whisker map'\''s' -x
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l out -d 'write the scene'\''s folder, for an engine of your own to run on' -r
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l json -d 'print the scores as one line of JSON'
 complete -c whisker -n '__fish_seen_subcommand_from texture; and not __fish_seen_subcommand_from train classify' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from texture; and not __fish_seen_subcommand_from train classify' -l help -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from texture; and not __fish_seen_subcommand_from train classify' -f -a train -d 'learn from one folder per surface, one CSV per recording'

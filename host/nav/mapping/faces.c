@@ -17,7 +17,7 @@ void nav_faces_begin(struct nav_faces *f)
     f->count = 0;
     f->loose = 0;
     f->right = 1.0;
-    f->refused = 0.5;
+    f->refused = 1.0;
 }
 
 static double faces_fresh(const struct nav_contact *c)

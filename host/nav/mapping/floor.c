@@ -8,7 +8,7 @@ static const double BLUR_M = 0.012; /* of a border, as windows show it */
 static const double NEAR = 3.0;     /* standard deviations from a border within which it matters */
 static const double SURE = 0.9;     /* of a tile's texture, before its borders correct the pose */
 static const double RIGHT_RAD = 0.006;
-static const double AXES_KNOWN = 1.0, RIGHT_MOST = 0.15;
+static const double AGREEMENT_WINDOWS = 60.0, AGREEMENT_LEAST = -0.2; /* nats */
 
 int nav_floor_init(struct nav_floor *f, int classes)
 {
@@ -107,6 +107,22 @@ static void floor_look(const struct nav_floor *f, const struct nav_joint *j, dou
 
 /* The window is of the tip's own tile with the probability that the tip is on this side; the moments of the Gaussian
  * that comes nearest to the product (assumed-density filtering). */
+static void floor_forget(struct nav_floor *f)
+{
+    memset(f->tile, 0, (size_t)NAV_FLOOR_SIDE * NAV_FLOOR_SIDE * (size_t)f->classes * sizeof *f->tile);
+    f->agreement = 0.0;
+}
+
+/* A floor that keeps being otherwise is learned anew. */
+static double floor_agree(struct nav_floor *f, double log_likelihood)
+{
+    f->evidence += log_likelihood;
+    f->agreement += (log_likelihood - f->agreement) / AGREEMENT_WINDOWS;
+    if (f->agreement < AGREEMENT_LEAST)
+        floor_forget(f);
+    return log_likelihood;
+}
+
 double nav_floor_take(struct nav_floor *f, struct nav_joint *j, double x, double y, const float *ratio)
 {
     struct floor_view v;
@@ -118,7 +134,7 @@ double nav_floor_take(struct nav_floor *f, struct nav_joint *j, double x, double
     double a = floor_ratio(f, own, ratio), b = floor_ratio(f, across, ratio), beyond = 0.5 * erfc(z / sqrt(2.0));
     if (z > NEAR) {
         floor_learn(f, own, 1.0, ratio);
-        return log(a);
+        return floor_agree(f, log(a));
     }
     double total = a * (1.0 - beyond) + b * beyond, density = exp(-0.5 * z * z) / (sd * sqrt(2.0 * NAV_PI));
     double slope = (a - b) * density / total, curve = -z / sd * slope - slope * slope;
@@ -127,7 +143,7 @@ double nav_floor_take(struct nav_floor *f, struct nav_joint *j, double x, double
     floor_learn(f, across, b * beyond / total, ratio);
     if (sure)
         nav_joint_correct(j, &v.form, variance, variance * slope, variance * (1.0 + variance * curve));
-    return log(total);
+    return floor_agree(f, log(total));
 }
 
 double nav_floor_sure(const struct nav_floor *f, int column, int row, int *texture)
@@ -142,12 +158,13 @@ double nav_floor_sure(const struct nav_floor *f, int column, int row, int *textu
     return read ? floor_sure(f, tile) : 0.0;
 }
 
-void nav_floor_adopt(struct nav_floor *f, struct nav_joint *j, const struct nav_lattice *l)
+void nav_floor_adopt(struct nav_floor *f, struct nav_joint *j, const struct nav_lattice *l, bool right)
 {
     f->known = true;
     f->x = l->x;
     f->y = l->y;
-    memset(f->tile, 0, (size_t)NAV_FLOOR_SIDE * NAV_FLOOR_SIDE * (size_t)f->classes * sizeof *f->tile);
+    f->evidence = 0.0;
+    floor_forget(f);
     nav_joint_set(j, NAV_JOINT_LATTICE_U, l->u, l->sigma_m * l->sigma_m);
     nav_joint_set(j, NAV_JOINT_LATTICE_V, l->v, l->sigma_m * l->sigma_m);
     nav_joint_set(j, NAV_JOINT_PITCH, l->pitch, l->sigma_pitch * l->sigma_pitch);
@@ -155,9 +172,6 @@ void nav_floor_adopt(struct nav_floor *f, struct nav_joint *j, const struct nav_
     struct nav_linear form = {.terms = 0};
     nav_linear_add(&form, NAV_JOINT_LATTICE_TURN, 1.0);
     nav_linear_add(&form, NAV_JOINT_AXES, -1.0);
-    double off = l->turn - j->mean[NAV_JOINT_AXES], variance = nav_joint_variance(j, &form);
-    if (variance < AXES_KNOWN)
-        off -= NAV_PI / 2.0 * round(off / (NAV_PI / 2.0));
-    if (variance > AXES_KNOWN || fabs(off) < fmin(3.0 * sqrt(variance), RIGHT_MOST))
-        nav_joint_measure(j, &form, -off, RIGHT_RAD * RIGHT_RAD);
+    if (right)
+        nav_joint_measure(j, &form, j->mean[NAV_JOINT_AXES] - l->turn, RIGHT_RAD * RIGHT_RAD);
 }

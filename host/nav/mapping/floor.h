@@ -13,8 +13,10 @@ enum { NAV_FLOOR_SIDE = 48 }; /* tiles each way, its middle at the lattice's ref
 struct nav_floor {
     bool known; /* the lattice */
     int classes;
-    double x, y; /* reference of the lattice */
-    float *tile; /* [SIDE][SIDE][classes] log-likelihoods of each tile's texture */
+    double x, y;      /* reference of the lattice */
+    double evidence;  /* log-likelihood of all windows by tiles */
+    double agreement; /* of late windows, a running mean of the same, nats */
+    float *tile;      /* [SIDE][SIDE][classes] log-likelihoods of each tile's texture */
 };
 
 /* 0, or -1 without memory; nav_floor_free either way. */
@@ -26,8 +28,8 @@ void nav_floor_copy(struct nav_floor *to, const struct nav_floor *from);
  * joint at borders. Returns the window's log-likelihood, 0 without a lattice. */
 double nav_floor_take(struct nav_floor *, struct nav_joint *, double x, double y, const float *ratio);
 
-/* Takes over a lattice, whose tiles are not known. */
-void nav_floor_adopt(struct nav_floor *, struct nav_joint *, const struct nav_lattice *);
+/* Takes over a lattice, whose tiles are not known. right: it stands along the world's right angles. */
+void nav_floor_adopt(struct nav_floor *, struct nav_joint *, const struct nav_lattice *, bool right);
 
 /* Probability of the likeliest texture of a tile, and which; 0 beyond the lattice and where nothing was read. */
 double nav_floor_sure(const struct nav_floor *, int column, int row, int *texture);

@@ -13,6 +13,8 @@ static const double SCALE_LEAST = 0.3, SCALE_MOST = 1.5; /* of the odometry's no
 static const double BEHIND = 30.0;                       /* nats at which a particle is given up */
 static const double MARGIN = 3.0;                        /* nats by which a new lattice must be better */
 static const double GROWN = 1.25;                        /* of the borders, since a lattice was sought last */
+static const double REFUSED = 5.0;                       /* nats against a lattice at which it is given up */
+static const double RIGHT_MOST = 0.15;                   /* rad between a lattice and faces that stand along it */
 static const double AXES_KNOWN = 1.0;                    /* rad^2 */
 enum { PARTICLES = 12, PARTICLES_MOST = 5000, SCALES = 4, CATCH_UP = 60, STREAM = 21 };
 
@@ -139,7 +141,8 @@ static void mapper_challenge(struct nav_mapper *m)
         return;
     m->challenger.scale = best->scale;
     nav_particle_map_begin(&m->challenger);
-    nav_floor_adopt(&m->challenger.floor, &m->challenger.joint, &found);
+    double off = known ? remainder(found.turn - j->mean[NAV_JOINT_AXES], NAV_PI / 2.0) : 0.0;
+    nav_floor_adopt(&m->challenger.floor, &m->challenger.joint, &found, fabs(off) < RIGHT_MOST);
     nav_trail_clear(&m->challenger_trail);
     m->caught_up = 0;
 }
@@ -171,6 +174,16 @@ static void mapper_catch_up(struct nav_mapper *m)
     if (m->challenger.evidence >
         best->evidence + (best->floor.known ? 0.0 : nav_trail_patches(&m->trail, true)) + MARGIN)
         mapper_take_over(m);
+}
+
+/* Gives a lattice up that patches of any shape explain the windows better than. */
+static void mapper_refuse(struct nav_mapper *m)
+{
+    const struct nav_floor *floor = &mapper_best(m)->floor;
+    if (!floor->known || floor->evidence > nav_trail_patches(&m->trail, true) - REFUSED)
+        return;
+    for (int n = 0; n < m->options.particles; n++)
+        m->particle[n].floor.known = false;
 }
 
 /* Mean and covariance of the particles' mixture. */
@@ -216,6 +229,7 @@ void nav_mapper_step(struct nav_mapper *m, const struct nav_row *row, struct nav
     mapper_resample(m);
     mapper_challenge(m);
     mapper_catch_up(m);
+    mapper_refuse(m);
     mapper_answer(m, out);
 }
 

@@ -3,20 +3,29 @@
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from crunchbot.arguments import add_action
+import numpy as np
+
+from crunchbot.arguments import add_action, whole_number
 from crunchbot.errors import UserError
-from crunchbot.nav import localise
+from crunchbot.nav import localise, mapping
 from crunchbot.nav.estimates import read_estimates
 from crunchbot.nav.judging import NEAR_M, bits_reported, bits_wanted, judge, starts_of, travel_of
+from crunchbot.nav.mapper import PARTICLES_MOST
+from crunchbot.nav.observations import Observations, observations_path, read_observations
 from crunchbot.nav.scoring import position_errors
+from crunchbot.scene import Scene, load
 from crunchbot.tables import TableError, unwritable
 
-from ..scenes import benchmark, write_scene
+from ..scenes import benchmark, map_scoring, write_scene
+from ..scenes.making import make
 
 EXAMPLE = "whisker bench touch --scene anchor+global --filter adaptive"
+MAP_EXAMPLE = "whisker bench map --scene anchor --seed 7 --rows 600"
+MAP_ROWS = 3000
 COLUMNS = (  # title, key of the figure, factor, format
     ("near %", "near_share", 100, "5.1f"),
     ("after 20 cm %", "near_share_after_20cm", 100, "5.1f"),
@@ -47,6 +56,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--peers", type=Path, default=benchmark.STORED, metavar="FILE", help="stored figures of other engines"
     )
     p.add_argument("--json", action="store_true", help="print the scores as one line of JSON")
+
+    _add_map(actions)
 
 
 def _metres(text: str) -> float:
@@ -132,3 +143,56 @@ def course(wanted: benchmark.Entry, engines: Sequence[Any], near_m: float) -> An
     errors = {e.name: (e.rows, position_errors(e.poses, rows.truth[e.rows])) for e in engines}
     travel, (x, y) = travel_of(rows, starts_of(rows)), scene.arena.size_m
     return Course(wanted.name, travel, x * y, near_m, bits_wanted(scene, near_m), bits_reported(scene, rows), errors)
+
+
+def _add_map(actions: Any) -> None:
+    p = add_action(actions, "map", "a map by touch alone, and the poses that it was made with", MAP_EXAMPLE, map_score)
+    text = (
+        "a family of scenes (see whisker scene make --list), or a scene folder with true poses (default: %(default)s)"
+    )
+    p.add_argument("--scene", default="anchor", metavar="NAME", help=text)
+    p.add_argument("--seed", type=whole_number(0), default=1, help="of a family's scene (default: %(default)s)")
+    p.add_argument("--rows", type=whole_number(1), default=MAP_ROWS, help="of a family's scene (default: %(default)s)")
+    text = (
+        "judge these poses, in the frame of the first one, of any engine (docs/formats.md), in place of whisker map's"
+    )
+    p.add_argument("--estimate", metavar="EST.CSV", help=text)
+    p.add_argument("--particles", type=whole_number(1, PARTICLES_MOST), metavar="N", help="as whisker map's")
+    p.add_argument("--out", metavar="DIR", help="write the scene's folder, for an engine of your own to run on")
+    p.add_argument("--json", action="store_true", help="print the scores as one line of JSON")
+
+
+def map_score(arguments: argparse.Namespace) -> int:
+    scene, rows = _map_scene(arguments)
+    if arguments.out:
+        try:
+            write_scene(arguments.out, scene, rows)
+        except OSError as error:
+            raise unwritable(arguments.out, error) from error
+        print(f"{arguments.out}: {arguments.scene}, {len(rows)} rows")
+        return 0
+    if rows.truth is None or not np.isfinite(rows.truth).all():
+        raise BenchError(f"bench map: {arguments.scene} has rows without true poses; give a scene that has them all")
+    found = _map_scores(arguments, scene, rows)
+    lines = (f"{key}: {'-' if value is None else f'{value:.4g}'}" for key, value in found.items())
+    print(json.dumps(found) if arguments.json else "\n".join(lines))
+    return 0
+
+
+def _map_scene(arguments: argparse.Namespace) -> tuple[Scene, Observations]:
+    if Path(arguments.scene).is_dir():
+        scene = load(arguments.scene)
+        return scene, read_observations(observations_path(arguments.scene), scene)
+    made = make(arguments.scene, arguments.seed, arguments.rows)
+    return made.scene, made.observations
+
+
+def _map_scores(arguments: argparse.Namespace, scene: Scene, rows: Observations) -> dict[str, float | None]:
+    if arguments.estimate:
+        mine = read_estimates(arguments.estimate, Path(arguments.estimate).stem, rows)
+        beside = map_scoring.trajectory(map_scoring.odometry_path(rows.odometry), rows.truth)
+        found = map_scoring.trajectory(mine.poses, rows.truth[mine.rows])
+        return found | {f"odometry_{key}": value for key, value in beside.items()}
+    robot, textures = replace(scene.robot, sensors=()), scene.arena.textures
+    mapped = mapping.run(robot, textures, rows, particles=arguments.particles, quiet=arguments.json)
+    return map_scoring.score(mapped, scene.arena)

@@ -1,0 +1,90 @@
+"""The scorer of maps: right maps score full marks, and each thing that is wrong costs its own figure."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from crunchbot import cli
+from crunchbot.nav.mapper import FACE, TouchMap
+from crunchbot_lab.scenes import map_scoring, write_scene
+from crunchbot_lab.scenes.making import make
+
+TURN, SHIFT = 0.7, np.array([0.3, -1.1])
+
+
+def away(points: np.ndarray) -> np.ndarray:
+    """World points in a map's frame of its own."""
+    return map_scoring.Motion(TURN, *SHIFT).points(np.asarray(points, float))
+
+
+def drawn(arena, off_m: float = 0.0, turn: float = 0.0) -> TouchMap:
+    """The true faces as a map, each moved along its normal and turned."""
+    faces = np.zeros(len(map_scoring.true_faces(arena)), FACE)
+    for n, (x0, y0, x1, y1, normal) in enumerate(map_scoring.true_faces(arena)):
+        shift = off_m * np.array([math.cos(normal), math.sin(normal)])
+        (a, b), (c, d) = away(np.array([[x0, y0], [x1, y1]]) + shift)
+        faces[n] = (a, b, c, d, normal + TURN + turn, 0.01, 0.01, 10, n, 1)
+    return TouchMap(faces, TURN, None, {})
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return make("anchor", 3, 800)
+
+
+@pytest.fixture(scope="module")
+def back(scene):
+    truth = scene.observations.truth
+    return map_scoring.best_motion(away(truth[:, :2]), truth[:, :2])
+
+
+def test_true_faces_in_another_frame_are_right(scene, back):
+    arena = scene.scene.arena
+    found = map_scoring.faces_score(drawn(arena), back, arena)
+    assert found["faces_right"] == 1.0 and found["faces_median_m"] < 1e-9
+    corners = map_scoring.corners_score(drawn(arena), back, arena, scene.observations.truth)
+    assert corners == {"corners_found": 1.0, "corners_false": 0.0}
+
+
+def test_faces_off_or_turned_are_not(scene, back):
+    arena = scene.scene.arena
+    assert map_scoring.faces_score(drawn(arena, off_m=0.02), back, arena)["faces_right"] < 0.2
+    assert map_scoring.faces_score(drawn(arena, turn=0.03), back, arena)["faces_right"] == 0.0
+    assert map_scoring.faces_score(drawn(arena, off_m=0.01), back, arena)["faces_right"] > 0.8
+
+
+def test_poses_are_judged_with_and_without_alignment(scene):
+    truth = scene.observations.truth
+    poses = np.column_stack([away(truth[:, :2]), truth[:, 2] + TURN])
+    found = map_scoring.trajectory(poses, truth)
+    assert found["error_median_m"] < 1e-9 and found["anchored_median_m"] < 1e-9
+    poses[0, 2] += 0.1  # the first heading alone is wrong
+    found = map_scoring.trajectory(poses, truth)
+    assert found["error_median_m"] < 1e-9 and found["anchored_median_m"] > 0.05
+
+
+def test_regions_that_are_too_small_hold_less(scene):
+    truth = scene.observations.truth
+    noise = np.random.default_rng(1).standard_normal((len(truth), 2))
+    poses = truth.copy()
+    poses[1:, :2] += 0.02 * noise[1:]
+    covariance = np.tile(np.diag([4e-4, 4e-4, 1e-4]), (len(truth), 1, 1))
+    assert 0.82 < map_scoring.coverage(poses, covariance, truth) < 0.97
+    assert map_scoring.coverage(poses, covariance / 16, truth) < 0.4
+
+
+def test_the_command_scores_the_mapper_and_the_poses_of_others(scene, tmp_path, capsys):
+    assert cli.main(["bench", "map", "--scene", "anchor", "--seed", "3", "--rows", "800", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["error_median_m"] < 0.05 and found["tiles_right"] > 0.9
+    write_scene(tmp_path, scene.scene, scene.observations)
+    truth = scene.observations.truth
+    lines = [",".join(map(repr, row)) for row in truth.tolist()]
+    (tmp_path / "est.csv").write_text("\n".join(["x_m,y_m,theta_rad", *lines]) + "\n")
+    words = ["bench", "map", "--scene", str(tmp_path), "--estimate", str(tmp_path / "est.csv"), "--json"]
+    assert cli.main(words) == 0
+    assert json.loads(capsys.readouterr().out)["error_median_m"] == pytest.approx(0.0, abs=1e-9)
+    assert cli.main(["bench", "map", "--scene", "no-such-family"]) != 0
+    assert capsys.readouterr().err.count("\n") == 1
