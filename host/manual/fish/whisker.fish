@@ -140,6 +140,7 @@ complete -c whisker -n '__fish_seen_subcommand_from robot' -l view-port -d '(802
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l out -d 'logs, bag, truth (robot-run)' -r
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l no-view -d 'no page for a browser'
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l seed -d 'of turns and simulation (1)' -x
+complete -c whisker -n '__fish_seen_subcommand_from robot' -l choose -d 'turns and distances: as of whisker pilot; plan needs --desktop here, or a navigator (default: random)' -x -a 'random plan wall lanes'
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l listen -d 'be reached at this address, by anyone who reaches it (default: this machine only)' -x
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l first-port -d 'of three, for supervisor, pilot and navigator (default: 7457)' -x
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l zenoh-config -d 'zenoh'\''s own configuration (JSON5): TLS and access control, see docs/remote.md; endpoints become tls/ADDRESS:PORT' -r
@@ -157,6 +158,7 @@ complete -c whisker -n '__fish_seen_subcommand_from pilot' -l ring-owner -d 'acc
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l base -d 'of whisker-base' -x
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l simulation -d 'of a simulation that waits for the pilot; without --base its wheels are driven directly' -x
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l seed -d 'of the random turns (default: 1)' -x
+complete -c whisker -n '__fish_seen_subcommand_from pilot' -l choose -d 'turns and distances: at random; by what the navigator'\''s belief is expected to gain; along walls; in lanes (random)' -x -a 'random plan wall lanes'
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l robot -d 'which robot (default: robot)' -x
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l listen -d 'endpoint to be reached at, tcp/HOST:PORT or tls/HOST:PORT; repeatable, or '\''none'\'' (default: tcp/127.0.0.1:7458)' -x
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l connect -d 'endpoint of another process, tcp/HOST:PORT or tls/HOST:PORT; repeatable, or '\''none'\'' (default: tcp/127.0.0.1:7459)' -x
