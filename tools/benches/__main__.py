@@ -30,6 +30,7 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
     "map": "nav.maps",
     "mechanics": "mechanics.bench",
     "nav": "nav.bench",
+    "nav_active": "nav.active",
     "nav_paper": "nav.paper",
     "nav_peers": "nav.peer_runs",
     "nav_size": "nav.size",

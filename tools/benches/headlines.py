@@ -238,6 +238,7 @@ STUDIES = {  # page, what it holds
     "results/nav_unseen.md": "families of scenes that no filter was made for",
     "results/map.md": "an unknown arena: a map by touch alone, and the pose in it",
     "results/nav_size.md": "a start unknown, by the size of the arena",
+    "results/nav_active.md": "where to touch next: a planner beside random exploration, in closed loop",
     "results/nav_normals.md": "what the direction of a touched surface is worth",
     "results/nav_paper.md": "the paper's navigation figures, repeated",
     "results/texture.md": "floor texture: faults, recordings, peers",

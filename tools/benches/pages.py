@@ -10,7 +10,7 @@ from pathlib import Path
 from . import headlines, studies
 from .contact import page as contact
 from .mechanics import edges
-from .nav import maps, normals, size, unseen
+from .nav import active, maps, normals, size, unseen
 from .nav import page as nav
 from .node import image
 from .node import page as node
@@ -41,6 +41,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "docs/results/host.md": of(studies.host, "host", "record", "view", "fuzz", "damage", "usb_soak"),
     "docs/results/mechanics.md": of(edges.page, "mechanics", "mechanics_edges"),
     "docs/results/nav.md": partial(parts, nav.document, "nav", NAV),
+    "docs/results/nav_active.md": of(active.page, "nav_active"),
     "docs/results/nav_normals.md": of(normals.page, "nav_normals"),
     "docs/results/nav_paper.md": of(studies.nav_paper, "nav_paper"),
     "docs/results/map.md": of(maps.page, "map"),

@@ -51,6 +51,7 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
             "nav_variation",
         ),
     ),
+    "tools/benches nav_active": (("nav_active",), ("nav_active",)),
     "tools/benches nav_paper": (("nav_paper",), ("nav_banana", "nav_fig6a", "nav_fig6b", "nav_fig6c")),
     "tools/benches nav_peers": (("nav_peers",), ()),
     "tools/benches nav_size": (("nav_size",), ("nav_size",)),

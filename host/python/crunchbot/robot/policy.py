@@ -64,7 +64,7 @@ def choices_of(name: str, scene: Scene, belief: Callable[[], np.ndarray | None],
     """The choices of this name of POLICIES; `random`: the behaviour's own."""
     if name == PLAN:
         vehicle = Vehicle(EXPLORE_M_S, TURN_RAD_S, CONTACT_S, WHISK_S, SETTLE_S)
-        return Planned(Planner(Places.of(ArenaMap(scene.arena), scene.robot), vehicle), belief, random)
+        return Planned(Planner(Places.of(ArenaMap(scene.arena), scene.robot), vehicle, steps=1), belief, random)
     return {RANDOM: random, "wall": Along(), "lanes": Lanes()}[name]
 
 
