@@ -5,6 +5,7 @@ Waiting is done by the stream: `odometry(after=...)` answers when so many more b
 
 import math
 import subprocess
+import time
 
 import pytest
 
@@ -144,12 +145,12 @@ def test_a_line_that_is_silent_for_a_second_is_back(robot):
 def test_a_base_that_neither_reported_nor_heard_went_on_as_it_did(robot):
     """Driving, and 2.8 s in which it hears no order to stop, and tells so in its first frame after."""
     it = robot("--event", "silent@1.5+2.8")
-    far = 0.0
+    far, began_s = 0.0, time.monotonic()
     while it.count("silences") == 0:
         it.base.drive(0.15, 0)
     while it.base.health()["mode"] != "safe" or far == 0.0:
         far += it.wait_frame().x_m
-    assert 0.38 < far < 0.75
+    assert 0.38 < far < 1.1 * 0.15 * (time.monotonic() - began_s), "more than wheels that are not exact can have gone"
 
 
 def test_a_firmware_that_reports_modes_one_too_high_is_understood(robot):
