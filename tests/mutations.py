@@ -402,8 +402,8 @@ MUTATIONS = [
         "pilot: bad samples used",
         "host/python/tests/pilot/test_pilot.py",
         "host/python/crunchbot/pilot/pilot.py",
-        "good = np.asarray(status)[:, : len(self.names)] == 0",
-        "good = np.asarray(status)[:, : len(self.names)] >= 0",
+        "good = len(self.names), np.asarray(status)[:, : len(self.names)] == 0",
+        "good = len(self.names), np.asarray(status)[:, : len(self.names)] >= 0",
     ),
     Mutation(
         "navigation: motion turned the wrong way",
