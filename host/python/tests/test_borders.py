@@ -19,7 +19,8 @@ from rings import ring_name
 import crunchbot
 from crunchbot.bridge.ring import FRAME, Writer
 from crunchbot.native import as_doubles, doubles, ffi, lib, octets
-from crunchbot.nav.filters import COMPONENT, Filter, Sensor, prior_fault
+from crunchbot.nav.filters import COMPONENT, Filter, Sensor, pack, prior_fault
+from crunchbot.nav.mapper import Mapper
 from crunchbot.nav.weigher import Weigher
 from crunchbot.touch.contact import Contact
 from crunchbot.touch.contact_filter import ContactFilter
@@ -40,6 +41,7 @@ AROUND = {"cast", "from_buffer", "ctypes"}  # ways around the helpers
 OWN = {
     "nav.filters.Filter.bins",
     "nav.filters.problem_of",
+    "nav.mapper.Mapper.map",
     "touch.radial.shape.terms_of",
     "signals.world.World.run",
     "signals.mechanics._counts",
@@ -96,6 +98,12 @@ CASES = {
         {"odometry": (0,), "texture": (0, 1), "radial_m": (0,)},
     ),
     "nav.filters.Filter.replay": of_rows(lambda rows: Filter("odometry", SCENE).replay(rows, 0, len(rows))),
+    "nav.filters.pack": of_rows(
+        lambda rows: pack(rows, OBSERVATIONS.texture.shape[1:], OBSERVATIONS.radial_m.shape[1], 0)
+    ),
+    "nav.mapper.Mapper.replay": of_rows(
+        lambda rows: Mapper(SCENE.robot, SCENE.arena.textures).replay(rows, 0, len(rows))
+    ),
     "nav.filters._sensors": Case(
         lambda **table: Filter("odometry", SCENE, sensors=[Sensor(cell_m=0.1, levels=2, **table)]),
         {"codes": np.zeros((3, 4), np.uint8), "edges": np.arange(4.0), "likelihood": np.ones((3, 2))},

@@ -52,7 +52,8 @@ class MadeUpFlight:
 
     def __init__(self):
         self.took, self.interruptions, self.ticks_used = [], [], 0
-        self.pilot = SimpleNamespace(bad_samples=0, whisks=[])
+        behaviour = SimpleNamespace(choices=None)
+        self.pilot = SimpleNamespace(bad_samples=0, whisks=[], behaviour=behaviour)
 
     def take(self, block):
         self.took.append(block[0])
