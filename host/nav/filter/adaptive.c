@@ -1,11 +1,11 @@
-/* The adaptive filter: as much belief as the rows leave open, and no more.
+/* The adaptive filter: its representation is as large as the uncertainty requires.
  *
- * Known: a cloud of hypotheses at exact poses, as many as its spread needs, or a Gaussian where that has predicted as
- * well. In doubt: an arena-wide histogram wakes and goes over the rows since which the robot may have been kidnapped;
- * both beliefs are held, weighted by how well they explained those rows. Unknown: the histogram alone, until its mass
- * sits in few enough cells for a cloud; as long as there are several modes it stays beside the cloud and tells what
- * each of them weighs. Work per row is bounded by adaptive.budget in every state: what the histogram has not done waits
- * for the next row. docs/navigation_adaptive.md tells more. */
+ * Pose known: a cloud of hypotheses at exact poses, as many as its spread needs, or a Gaussian where that predicted the
+ * rows as well. In doubt: an arena-wide histogram starts and takes the rows since which the robot may have been
+ * kidnapped; the filter keeps both beliefs, weighted by how well they explained those rows. Pose unknown: the histogram
+ * alone, until its mass lies in few enough cells for a cloud. While there are several modes it stays active beside the
+ * cloud and sets their weights. Work per row is bounded by adaptive.budget in every state: what the histogram has not
+ * done waits for the next row. docs/navigation_adaptive.md describes it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
