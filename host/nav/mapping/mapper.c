@@ -1,13 +1,11 @@
 #define _POSIX_C_SOURCE 200809L /* clock_gettime */
 
-#include "mapper.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-#include "particle_map.h"
+#include "mapper_state.h"
 
 static const double SCALE_LEAST = 0.3, SCALE_MOST = 1.5; /* of the odometry's noise */
 static const double BEHIND = 30.0;                       /* nats at which a particle is given up */
@@ -15,21 +13,7 @@ static const double MARGIN = 3.0;                        /* nats by which a new 
 static const double GROWN = 1.25;                        /* of the borders, since a lattice was sought last */
 static const double REFUSED = 5.0;                       /* nats against a lattice at which it is given up */
 static const double RIGHT_MOST = 0.15;                   /* rad between a lattice and faces that stand along it */
-static const double AXES_KNOWN = 1.0;                    /* rad^2 */
 enum { PARTICLES = 12, PARTICLES_MOST = 5000, SCALES = 4, CATCH_UP = 60, STREAM = 21 };
-
-struct nav_mapper {
-    const struct nav_problem *problem;
-    struct nav_mapper_options options;
-    struct nav_record record;
-    struct nav_particle_map *particle;  /* [particles] */
-    struct nav_particle_map challenger; /* takes all rows again, with a lattice */
-    long caught_up;                     /* rows it has taken; -1: there is none */
-    struct nav_trail trail, challenger_trail;
-    struct nav_lattice_search search;
-    int sought; /* borders when a lattice was sought last */
-    struct nav_rng rng;
-};
 
 struct nav_mapper_options nav_mapper_default(void)
 {
@@ -50,6 +34,7 @@ static int mapper_init(struct nav_mapper *m)
     failed |= nav_trail_init(&m->trail, &problem->arena, &problem->robot);
     failed |= nav_trail_init(&m->challenger_trail, &problem->arena, &problem->robot);
     failed |= nav_lattice_search_init(&m->search, problem->arena.classes);
+    failed |= nav_cells_init(&m->cells);
     failed |= nav_particle_map_init(&m->challenger, problem->arena.classes);
     m->particle = calloc((size_t)m->options.particles, sizeof *m->particle);
     for (int n = 0; m->particle && n < m->options.particles; n++) {
@@ -88,11 +73,12 @@ void nav_mapper_free(struct nav_mapper *m)
     nav_trail_free(&m->trail);
     nav_trail_free(&m->challenger_trail);
     nav_lattice_search_free(&m->search);
+    nav_cells_free(&m->cells);
     nav_record_free(&m->record);
     free(m);
 }
 
-static struct nav_particle_map *mapper_best(const struct nav_mapper *m)
+struct nav_particle_map *nav_mapper_best(const struct nav_mapper *m)
 {
     struct nav_particle_map *best = &m->particle[0];
     for (int n = 1; n < m->options.particles; n++)
@@ -117,10 +103,18 @@ static void mapper_follow(const struct nav_mapper *m, struct nav_trail *trail, c
         nav_trail_row_done(trail);
 }
 
+static void mapper_mark(struct nav_mapper *m, const struct nav_record_row *row)
+{
+    const struct nav_particle_map *best = nav_mapper_best(m);
+    const double *cov = best->joint.cov;
+    double variance = (cov[NAV_JOINT_X] + cov[NAV_JOINT_Y * (best->joint.room + 1)]) / 2.0;
+    nav_cells_take(&m->cells, &m->record, row, nav_particle_map_pose(best), sqrt(fmax(variance, 0.0)));
+}
+
 /* Hypotheses that the rows speak against go on from the best one, each with its own trust in the odometry. */
 static void mapper_resample(struct nav_mapper *m)
 {
-    const struct nav_particle_map *best = mapper_best(m);
+    const struct nav_particle_map *best = nav_mapper_best(m);
     for (int n = 0; n < m->options.particles; n++) {
         if (m->particle[n].evidence < best->evidence - BEHIND)
             nav_particle_map_copy(&m->particle[n], best);
@@ -130,10 +124,11 @@ static void mapper_resample(struct nav_mapper *m)
 /* Looks for a lattice when there are enough new borders, and begins to try it on all rows. */
 static void mapper_challenge(struct nav_mapper *m)
 {
-    const struct nav_particle_map *best = mapper_best(m);
+    const struct nav_particle_map *best = nav_mapper_best(m);
     const struct nav_joint *j = &best->joint;
     struct nav_lattice found;
-    bool due = m->trail.borders > GROWN * m->sought, known = j->cov[NAV_JOINT_AXES * (j->room + 1)] < AXES_KNOWN;
+    bool due = m->trail.borders > GROWN * m->sought,
+         known = j->cov[NAV_JOINT_AXES * (j->room + 1)] < NAV_MAPPER_AXES_KNOWN;
     if (m->caught_up >= 0 || !due || !m->options.lattice || !nav_record_whole(&m->record))
         return;
     m->sought = m->trail.borders;
@@ -170,7 +165,7 @@ static void mapper_catch_up(struct nav_mapper *m)
     if (m->caught_up < m->record.rows)
         return;
     m->caught_up = -1;
-    const struct nav_particle_map *best = mapper_best(m);
+    const struct nav_particle_map *best = nav_mapper_best(m);
     if (m->challenger.evidence >
         best->evidence + (best->floor.known ? 0.0 : nav_trail_patches(&m->trail, true)) + MARGIN)
         mapper_take_over(m);
@@ -179,7 +174,7 @@ static void mapper_catch_up(struct nav_mapper *m)
 /* Gives a lattice up that patches of any shape explain the windows better than. */
 static void mapper_refuse(struct nav_mapper *m)
 {
-    const struct nav_floor *floor = &mapper_best(m)->floor;
+    const struct nav_floor *floor = &nav_mapper_best(m)->floor;
     if (!floor->known || floor->evidence > nav_trail_patches(&m->trail, true) - REFUSED)
         return;
     for (int n = 0; n < m->options.particles; n++)
@@ -189,7 +184,7 @@ static void mapper_refuse(struct nav_mapper *m)
 /* Mean and covariance of the particles' mixture. */
 static void mapper_estimate(const struct nav_mapper *m, struct nav_estimate *out)
 {
-    const struct nav_particle_map *best = mapper_best(m);
+    const struct nav_particle_map *best = nav_mapper_best(m);
     const double *centre = best->joint.mean;
     double total = 0.0, mean[3] = {0.0}, square[9] = {0.0};
     for (int n = 0; n < m->options.particles; n++) {
@@ -225,7 +220,8 @@ void nav_mapper_step(struct nav_mapper *m, const struct nav_row *row, struct nav
     struct nav_record_row taken = nav_record_at(&m->record, nav_record_take(&m->record, row));
     for (int n = 0; n < m->options.particles; n++)
         nav_particle_map_take(&m->particle[n], &m->record, &taken, n < SCALES ? NULL : &m->rng);
-    mapper_follow(m, &m->trail, mapper_best(m), &taken);
+    mapper_follow(m, &m->trail, nav_mapper_best(m), &taken);
+    mapper_mark(m, &taken);
     mapper_resample(m);
     mapper_challenge(m);
     mapper_catch_up(m);
@@ -259,68 +255,4 @@ uint64_t nav_mapper_bad_cells(const struct nav_mapper *m)
 uint64_t nav_mapper_bad_rows(const struct nav_mapper *m)
 {
     return m->record.intake.bad_rows;
-}
-
-/* The stretch of a face from cell `from` on that was felt; returns the cell after it. */
-static int mapper_stretch(const struct nav_particle_map *p, int number, int from, struct nav_mapper_face *out)
-{
-    const struct nav_face *g = &p->faces.face[number];
-    const struct nav_joint *j = &p->joint;
-    double low, high;
-    int next = nav_face_stretch(g, from, &low, &high);
-    double normal = j->mean[g->index], nx = cos(normal), ny = sin(normal), offset = j->mean[g->index + 1];
-    double x = g->anchor_x + nx * offset, y = g->anchor_y + ny * offset;
-    *out = (struct nav_mapper_face){.x0 = x - ny * low,
-                                    .y0 = y + nx * low,
-                                    .x1 = x - ny * high,
-                                    .y1 = y + nx * high,
-                                    .normal = nav_wrap(normal),
-                                    .normal_sigma = sqrt(fmax(j->cov[g->index * (j->room + 1)], 0.0)),
-                                    .offset_sigma = sqrt(fmax(j->cov[(g->index + 1) * (j->room + 1)], 0.0)),
-                                    .hits = g->hits,
-                                    .face = number,
-                                    .right = g->right};
-    return next;
-}
-
-long nav_mapper_faces(const struct nav_mapper *m, struct nav_mapper_face *out, long room)
-{
-    const struct nav_particle_map *p = mapper_best(m);
-    long count = 0;
-    for (int n = 0; n < p->faces.count; n++) {
-        struct nav_mapper_face stretch;
-        for (int cell = mapper_stretch(p, n, 0, &stretch); cell > 0; cell = mapper_stretch(p, n, cell, &stretch)) {
-            if (count < room)
-                out[count] = stretch;
-            count++;
-        }
-    }
-    return count;
-}
-
-struct nav_mapper_lattice nav_mapper_lattice(const struct nav_mapper *m)
-{
-    const struct nav_particle_map *p = mapper_best(m);
-    const struct nav_joint *j = &p->joint;
-    const double *mean = j->mean, *cov = j->cov;
-    int step = j->room + 1;
-    bool known = cov[NAV_JOINT_AXES * step] < AXES_KNOWN;
-    struct nav_mapper_lattice out = {.axes = known ? mean[NAV_JOINT_AXES] : (double)NAN};
-    if (!p->floor.known)
-        return out;
-    double c = cos(mean[NAV_JOINT_LATTICE_TURN]), s = sin(mean[NAV_JOINT_LATTICE_TURN]);
-    double u = mean[NAV_JOINT_LATTICE_U], v = mean[NAV_JOINT_LATTICE_V];
-    out.x = p->floor.x + c * u - s * v;
-    out.y = p->floor.y + s * u + c * v;
-    out.turn = mean[NAV_JOINT_LATTICE_TURN];
-    out.pitch = mean[NAV_JOINT_PITCH];
-    out.sigma_m = sqrt(fmax(cov[NAV_JOINT_LATTICE_U * step], cov[NAV_JOINT_LATTICE_V * step]));
-    out.sigma_turn = sqrt(cov[NAV_JOINT_LATTICE_TURN * step]);
-    out.sigma_pitch = sqrt(cov[NAV_JOINT_PITCH * step]);
-    return out;
-}
-
-double nav_mapper_tile(const struct nav_mapper *m, int column, int row, int *texture)
-{
-    return nav_floor_sure(&mapper_best(m)->floor, column, row, texture);
 }

@@ -51,6 +51,28 @@ struct nav_mapper_face {
 /* The map's faces: the first `room` stretches go to `out`. Returns how many there are. */
 long nav_mapper_faces(const struct nav_mapper *, struct nav_mapper_face *out, long room);
 
+/* Where two faces meet at a wide angle. */
+struct nav_mapper_corner {
+    double x, y, xx, xy, yy; /* m; covariance, m^2 */
+    int face[2];             /* their numbers */
+};
+
+/* The map's corners: the first `room` go to `out`. Returns how many there are. */
+long nav_mapper_corners(const struct nav_mapper *, struct nav_mapper_corner *out, long room);
+
+/* Square cells of `cell` m along the first pose's axes, the lower left corner of them all at (x, y). */
+struct nav_mapper_grid {
+    double x, y, cell;
+    int columns, rows;
+};
+
+/* The smallest grid that holds all cells of which something is known; they reach 6.4 m from the first pose. */
+struct nav_mapper_grid nav_mapper_grid(const struct nav_mapper *);
+
+/* Probability that something solid is in each cell of that grid, out[rows][columns], the lowest y first; 0.5: nothing
+ * is known. */
+void nav_mapper_occupancy(const struct nav_mapper *, float *out);
+
 /* Tile (0, 0) has its lower left corner at (x, y); tiles follow along `turn` and across it. pitch 0: no lattice. */
 struct nav_mapper_lattice {
     double x, y, turn, pitch;

@@ -3,8 +3,9 @@
 Everything is in the frame of the first pose: x forward, y left of the robot as it stood then.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +19,10 @@ FACE = np.dtype(
     [(name, "f8") for name in ("x0", "y0", "x1", "y1", "normal", "normal_sigma", "offset_sigma", "hits")]
     + [("face", "i4"), ("right", "i4")]
 )
-FACES = ffi.typeof("struct nav_mapper_face[]")
+CORNER = np.dtype([(name, "f8") for name in ("x", "y", "xx", "xy", "yy")] + [("face", "i4", 2)])
+FACES, CORNERS = ffi.typeof("struct nav_mapper_face[]"), ffi.typeof("struct nav_mapper_corner[]")
 assert FACE.itemsize == ffi.sizeof("struct nav_mapper_face")
+assert CORNER.itemsize == ffi.sizeof("struct nav_mapper_corner")
 SEED_MOST = 2**64 - 1
 PARTICLES_MOST = 5000
 PATCH_M = 0.3
@@ -44,15 +47,29 @@ class Lattice:
 
 
 @dataclass(frozen=True)
+class Grid:
+    """Square cells of `cell` m along the first pose's axes, the lower left corner of them all at (`x`, `y`), m. `occupied`:
+    (rows, columns) probability that something solid is there, the lowest y first; 0.5: nothing is known."""
+
+    x: float
+    y: float
+    cell: float
+    occupied: np.ndarray
+
+
+@dataclass(frozen=True)
 class TouchMap:
     """What is believed of the world. `faces`: (n,) of FACE, stretches that were felt; `axes`: direction of their right
     angles, rad, None: not known; `lattice`: None where the evidence is for none. `tiles`: (column, row) of the lattice to
-    (index of its likeliest texture, probability)."""
+    (index of its likeliest texture, probability). `corners`: (n,) of CORNER, where faces meet, m, with covariance, m^2.
+    """
 
     faces: np.ndarray
     axes: float | None
     lattice: Lattice | None
     tiles: dict[tuple[int, int], tuple[int, float]]
+    corners: np.ndarray = field(default_factory=lambda: np.zeros(0, CORNER))
+    grid: Grid | None = None
 
 
 def default_particles() -> int:
@@ -102,17 +119,29 @@ class Mapper:
         return table, step_us
 
     def map(self) -> TouchMap:
-        """The map after the last row."""
-        count = lib.nav_mapper_faces(self._mapper, ffi.NULL, 0)
-        faces = np.zeros(count, FACE)
-        lib.nav_mapper_faces(self._mapper, pointer(FACES, FACE, faces, "faces", (count,)), count)
+        """The map after the last row: cheap enough for once a second."""
+        faces = self._listed(lib.nav_mapper_faces, FACES, FACE, "faces")
+        corners = self._listed(lib.nav_mapper_corners, CORNERS, CORNER, "corners")
         found = lib.nav_mapper_lattice(self._mapper)
         axes = None if found.axes != found.axes else float(found.axes)
-        if not found.pitch > 0.0:
-            return TouchMap(faces, axes, None, {})
-        place = (found.x, found.y, found.turn, found.pitch)
-        lattice = Lattice(*place, found.sigma_m, found.sigma_turn, found.sigma_pitch)
-        return TouchMap(faces, axes, lattice, dict(self._tiles()))
+        lattice, tiles = None, {}
+        if found.pitch > 0.0:
+            place = (found.x, found.y, found.turn, found.pitch)
+            lattice = Lattice(*place, found.sigma_m, found.sigma_turn, found.sigma_pitch)
+            tiles = dict(self._tiles())
+        return TouchMap(faces, axes, lattice, tiles, corners, self._grid())
+
+    def _listed(self, get: Callable[..., int], kind: Any, dtype: np.dtype, name: str) -> np.ndarray:
+        count = get(self._mapper, ffi.NULL, 0)
+        out = np.zeros(count, dtype)
+        get(self._mapper, pointer(kind, dtype, out, name, (count,)), count)
+        return out
+
+    def _grid(self) -> Grid:
+        grid = lib.nav_mapper_grid(self._mapper)
+        occupied = np.zeros((grid.rows, grid.columns), np.float32)
+        lib.nav_mapper_occupancy(self._mapper, ffi.cast("float *", ffi.from_buffer(occupied)))
+        return Grid(grid.x, grid.y, grid.cell, occupied)
 
     def _tiles(self) -> Iterator[tuple[tuple[int, int], tuple[int, float]]]:
         texture = ffi.new("int *")

@@ -15,6 +15,7 @@ from crunchbot.scene import load
 from crunchbot_lab.scenes import write_scene
 from crunchbot_lab.scenes.geometry import compose
 from crunchbot_lab.scenes.making import make
+from crunchbot_lab.scenes.map_scoring import best_motion, true_faces
 
 ROWS = 2000
 
@@ -56,6 +57,31 @@ def test_the_tiles_of_the_floor_are_found():
     assert abs(run.touched.lattice.pitch - made.scene.arena.tile_m) < 0.02
     axes = run.touched.axes - run.touched.lattice.turn
     assert abs(math.remainder(axes, math.pi / 2)) < math.radians(1)
+
+
+def test_cells_are_solid_and_free_as_often_as_they_are_said_to_be():
+    made, run = mapped("anchor", 12)
+    grid, motion = run.touched.grid, best_motion(run.table["pose"][:, :2], made.observations.truth[:, :2])
+    rows, columns = np.nonzero(np.abs(grid.occupied - 0.5) > 0.01)
+    middles = np.column_stack([grid.x + (columns + 0.5) * grid.cell, grid.y + (rows + 0.5) * grid.cell])
+    arena, said = made.scene.arena, grid.occupied[rows, columns]
+    free = np.array([arena.is_free(x, y, 0.0) for x, y in motion.points(middles)])
+    assert len(said) > 1000
+    assert free[said < 0.05].mean() > 0.98
+    assert free[said > 0.9].mean() < 0.25
+    assert abs((1.0 - free.mean()) - said.mean()) < 0.1
+
+
+def test_corners_are_as_far_off_as_they_are_said_to_be():
+    made, run = mapped("anchor", 12)
+    motion = best_motion(run.table["pose"][:, :2], made.observations.truth[:, :2])
+    truth = np.unique(true_faces(made.scene.arena)[:, :4].reshape(-1, 2), axis=0)
+    found = run.touched.corners
+    off = np.hypot(*np.moveaxis(motion.points(np.column_stack([found["x"], found["y"]]))[:, None] - truth, -1, 0))
+    spread = np.sqrt(found["xx"] + found["yy"])
+    assert len(found) >= 3
+    assert (off.min(axis=1) < 3.0 * spread).mean() > 0.8
+    assert ((found["xx"] > 0.0) & (found["xx"] * found["yy"] >= found["xy"] ** 2)).all()
 
 
 def test_no_tiles_are_made_up():
