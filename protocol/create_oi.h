@@ -199,8 +199,8 @@ enum { CREATE_OI_CHARGER_INTERNAL = 1, CREATE_OI_CHARGER_DOCK = 2 };
 /* Quantities. Distance and angle are reported in whole units. */
 #define CREATE_OI_ENCODER_COUNTS_PER_TURN 508.8 /* [2] */
 #define CREATE_OI_V3_SPEED_STEP_MM_S 28.5       /* [2]: wheels turn at multiples of about this */
-/* Up to firmware 3.4.0 a Create 2 tells degrees multiplied by this: divide what it tells; distance (19) and radius (40)
- * are wrong before 3.3.0 (libcreate's notes). */
+/* Up to firmware 3.4.0 a Create 2 reports degrees multiplied by this: divide what it reports; distance (19) and radius
+ * (40) are wrong before 3.3.0 (libcreate's notes). */
 #define CREATE_OI_V3_OLD_ANGLE_UNIT 0.324056
 
 #endif

@@ -434,7 +434,7 @@ MUTATIONS = [
         "return now - before;",
     ),
     Mutation(
-        "base: a slow turn that tells nothing speaks against kept remainders",
+        "base: a slow turn that carries no information counts against kept remainders",
         "sim_create.remainder",
         "host/create/src/remainder.c",
         "    if (reported > 0) {",

@@ -204,7 +204,7 @@ def agree_on_resets(netlist: Path, top: str) -> None:
 
 
 def place(board: Board, lanes: int, netlist: Path, out: Path, seed: int = 1, speed: int | None = None) -> dict:
-    """Places and routes; the report of report.read. A missed clock is no error here: the report tells."""
+    """Places and routes; the report of report.read. A missed clock is no error here: it is in the report."""
     if gowin.is_gowin(board.device):
         return report.read(gowin.place(board, sites(board, lanes), netlist, out, seed))
     (out / "pins.lpf").write_text(constraints(board, lanes))

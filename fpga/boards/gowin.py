@@ -40,7 +40,7 @@ def synthesise(top: str, front: list[str], out: Path) -> Path:
 
 
 def place(board, sites: dict[str, str], netlist: Path, out: Path, seed: int) -> Path:
-    """Places and routes; nextpnr's report. The oscillator is held to the same clock as the rest. A missed clock is no error here: the report tells."""
+    """Places and routes; nextpnr's report. The oscillator is held to the same clock as the rest. A missed clock is no error here: it is in the report."""
     (out / "pins.cst").write_text(constraints(sites))
     result = f"report_{seed}.json"
     options = ["--json", netlist.name, "--write", f"{board.name}.json", "--freq", board.clock_mhz, "--seed", seed]

@@ -1,4 +1,4 @@
-"""What the bridge tells a USB host about itself: device, configuration, strings and the HID report descriptor."""
+"""What the bridge reports to a USB host about itself: device, configuration, strings and the HID report descriptor."""
 
 import struct
 from dataclasses import dataclass

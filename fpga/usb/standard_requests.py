@@ -38,7 +38,7 @@ class StandardRequests(ControlRequestHandler):
     hid_interface: which of them is HID.
 
         full_speed               in: the bus runs at full speed
-        self_powered             in: what GET_STATUS tells of the device
+        self_powered             in: what GET_STATUS reports of the device
         serial                   in: serial number, shown as 16 hexadecimal digits; 0: the text among the descriptors
         address                  in: the device's, 0 in the default state
         other_token, other_address   in: strobe and address of any token on the bus, whomever it is for

@@ -14,7 +14,7 @@ struct anchor {
     double x, y, sigma_m;
 };
 
-/* The distance that a range should tell at a pose, as a code. */
+/* The distance that a range should report at a pose, as a code. */
 static int uwb_range_anchor_expect(const void *self, double x, double y, double theta)
 {
     const struct anchor *anchor = self;

@@ -189,7 +189,7 @@ void UrbScheduler::start_afresh()
     end_all({&bulk_, &interrupt_}, -ESHUTDOWN);
 }
 
-// The report that starts and stops the bridge passes here; what it says tells which tick is a run's last.
+// The report that starts and stops the bridge passes here; it holds which tick is a run's last.
 void UrbScheduler::watch_run(const Urb &urb)
 {
     const SetupRequest &setup = urb.setup;

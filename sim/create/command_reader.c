@@ -21,7 +21,7 @@ static const struct opcode *command_reader_find(int version, uint8_t code)
     return NULL;
 }
 
-/* Bytes of the command, as far as the bytes there are tell. */
+/* Bytes of the command, as far as the bytes there are show it. */
 static size_t command_reader_length(const struct opcode *opcode, const struct create_reader *reader)
 {
     switch (opcode->arguments) {

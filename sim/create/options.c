@@ -132,7 +132,7 @@ static const struct {
 } DESCRIPTIONS[OPTIONS] = {
     [DROP_REMAINDER] = {"drop-remainder", NULL, "distance and angle forget, when read, what is less than a unit"},
     [BATTERY_LOW] = {"battery-low", NULL, "begin with 3 % of the charge"},
-    [MODE_PLUS_ONE] = {"mode-plus-one", NULL, "firmware that tells a mode one higher than it is"},
+    [MODE_PLUS_ONE] = {"mode-plus-one", NULL, "firmware that reports a mode one higher than it is"},
     [OLD_ANGLE] = {"old-angle", NULL, "firmware up to 3.4.0: angles multiplied by 0.324056"},
     [OLD_DISTANCE] = {"old-distance", "F", "firmware before 3.3.0: distance and radius multiplied by F"},
     [LOSE_BYTES] = {"lose-bytes", "P", "share of the bytes it sends that are lost"},

@@ -1,4 +1,4 @@
-/* What packets tell. One table says which there are and how long they are, for both models. */
+/* What packets hold. One table lists them and their lengths, for both models. */
 #include "sim_create_state.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
  * own.
  *
  * It lives in ticks of 500 us. Before each tick its owner hands over the bytes that have come
- * (sim_create_receive) and drives the wheels as it wants (sim_create_speed); then tells what the wheels counted
+ * (sim_create_receive) and drives the wheels as it wants (sim_create_speed); then reports what the wheels counted
  * (sim_create_tick) and takes the bytes that have left (sim_create_take). Equal options, bytes and motion give equal
  * bytes.
  *
@@ -26,7 +26,7 @@ enum sim_create_stimulus {
     SIM_CREATE_BUMP_LEFT = 1 << 1,
     SIM_CREATE_DROP_RIGHT = 1 << 2,
     SIM_CREATE_DROP_LEFT = 1 << 3,
-    SIM_CREATE_DROP_CASTER = 1 << 4, /* Create 2 does not tell it */
+    SIM_CREATE_DROP_CASTER = 1 << 4, /* Create 2 does not report it */
     SIM_CREATE_CLIFF_LEFT = 1 << 5,
     SIM_CREATE_CLIFF_FRONT_LEFT = 1 << 6,
     SIM_CREATE_CLIFF_FRONT_RIGHT = 1 << 7,
@@ -49,7 +49,7 @@ struct sim_create_options {
     uint64_t seed;       /* of the line's faults */
     bool drop_remainder; /* what is less than a whole mm or degree at a reading is forgotten, not kept for the next */
     bool battery_low;    /* starts with 3 % of its charge */
-    bool mode_plus_one;  /* firmware that tells a mode one higher than it is */
+    bool mode_plus_one;  /* firmware that reports a mode one higher than it is */
     double distance_factor;   /* old firmware: what packets 19 and 40 are multiplied by; 1: sound */
     double angle_factor;      /* old firmware: what packet 20 is multiplied by; 1: sound */
     double lose, flip, extra; /* share of the bytes sent that are lost, have one bit flipped, have a random one after */

@@ -21,7 +21,7 @@ struct create_model {
     unsigned baud;
     double wheel_base_mm;
     double speed_step_mm_s; /* 0: any */
-    uint8_t no_infrared;    /* what packet 17 tells when there is none */
+    uint8_t no_infrared;    /* what packet 17 holds when there is none */
 };
 
 /* A command whose bytes are still coming. */
@@ -115,7 +115,7 @@ void create_drive_direct(sim_create *create, int16_t right, int16_t left);
 void create_drive_pwm(sim_create *create, int16_t right, int16_t left);
 void create_stop_wheels(sim_create *create);
 
-/* Renews what packets tell. */
+/* Renews what packets hold. */
 void create_renew(sim_create *create);
 /* Writes the data of a packet or group; returns its bytes, 0 for one this model does not have or without room. */
 size_t create_report(sim_create *create, uint8_t id, uint8_t *to, size_t room);

@@ -3,7 +3,7 @@
  * vectors: each interrupt and trap raised, in the application and in the loader: "returns" or "restarts".
  * handlers: cycles of the interrupts that mdb_table.py times on another simulator, raised alike.
  * boots: N supplies that come on with random memory: ticks until good records.
- * resets: each cause, on chips that keep their oscillator over a reset and on others: what the records tell, the clock
+ * resets: each cause, on chips that keep their oscillator over a reset and on others: what the records hold, the clock
  * before and after, ticks lost. */
 #include <stdio.h>
 #include <stdlib.h>

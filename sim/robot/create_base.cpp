@@ -62,9 +62,9 @@ bool CreateBase::has(std::optional<uint64_t> written)
     }
     const auto now = std::chrono::steady_clock::now();
     if (now - waits_since_.value_or(now) > PATIENCE) {
-        throw std::runtime_error("socket: the pilot tells " + std::to_string(*written) +
+        throw std::runtime_error("socket: the pilot reports " + std::to_string(*written) +
                                  " bytes written to the base's port, but only " + std::to_string(come) +
-                                 " have come; tell what the driver has written since the run began");
+                                 " have come; report what the driver has written since the run began");
     }
     waits_since_ = waits_since_.value_or(now);
     return false;

@@ -67,7 +67,7 @@ bool sim_object_whisker_start(struct sim_object_whisker *whisker, const struct s
     return true;
 }
 
-/* Has the shaft swept over this corner? Then radius tells where along the shaft, side on which side the corner was. */
+/* Has the shaft swept over this corner? Then radius is where along the shaft, side on which side the corner was. */
 static bool object_whisker_swept(struct segment from, struct segment to, struct sim_point corner, double *radius,
                                  double *side)
 {

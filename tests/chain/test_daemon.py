@@ -35,7 +35,7 @@ def ring() -> str:
 
 def until(condition, process: subprocess.Popen, reader: Reader) -> None:
     """Looks whenever frames come into the reader's ring, which stays where it is; fails when the process ends or a generous
-    time is over. What the daemon tells without a frame wakes nobody, so LOOK_S without one is enough too.
+    time is over. What the daemon reports without a frame wakes no reader, so LOOK_S without one is enough too.
     """
     give_up = time.monotonic() + END_S
     with Reader(reader.name) as watcher:

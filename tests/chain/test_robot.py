@@ -105,7 +105,7 @@ def test_under_a_pace_the_world_goes_on_without_its_bridge(tmp_path):
 
 @pytest.mark.parametrize("level", ["bytes", "rtl"])
 def test_under_a_pace_the_world_goes_on_while_its_host_is_stopped(tmp_path, level):
-    """As on hardware: the FIFO overflows, what it has no room for is counted, and the ticks tell the gap."""
+    """As on hardware: the FIFO overflows, what it has no room for is counted, and the ticks show the gap."""
     scene, _ = write_flat_scene(tmp_path, SEED)
     path, ring = tmp_path / "sim.sock", f"whisker-test-stopped-{os.getpid()}"
     command = simulation(tmp_path, scene, 3600, SEED, ring, "--socket", path, "--pace", 1, "--level", level)

@@ -10,7 +10,7 @@ from .witness import TICKS_PER_S, Witness
 FRAME_TICKS = 30  # of the base's stream: 15 ms
 EDGE_TICKS = 600  # the world's tick and a reader's count are seen at different times, 0.1 s and a batch apart
 EDGE_FRAMES = 16  # of the base: its counts are asked for at another time than the world's
-SHARE = 0.1  # of a gap that a clock may be wrong by where time is all that is left to tell it
+SHARE = 0.1  # of a gap that a clock may be wrong by where time is all that is left to measure it
 
 
 @dataclass(frozen=True)

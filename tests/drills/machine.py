@@ -120,7 +120,7 @@ class Machine:
         return self._supervisor.pid(name)
 
     def base_health(self) -> dict[str, str]:
-        """What whisker-base tells an observer; empty: it does not answer."""
+        """What whisker-base reports to an observer; empty: it does not answer."""
         try:
             with Base(str(self.base_socket)) as base:
                 return base.health()

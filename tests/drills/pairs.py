@@ -206,7 +206,7 @@ def ends_run(hits: Hits) -> bool:
 
 
 def concerns_wheels(hits: Hits) -> bool:
-    """Whether they have to stop, and a world that goes on tells so."""
+    """Whether they have to stop, and a world that goes on shows it."""
     names = {name for name, _ in hits}
     return bool(CONCERN_WHEELS & names) and "bridge" not in names
 

@@ -129,7 +129,7 @@ class Frames(Watch):
 
 
 class Messages(Watch):
-    """Rows and answers as pilot and navigator send them, past the relays; their health as they tell it."""
+    """Rows and answers as pilot and navigator send them, past the relays; their health as they report it."""
 
     def __init__(self, link: Link, truth: Truth, stop):
         super().__init__(stop)

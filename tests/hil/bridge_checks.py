@@ -165,7 +165,7 @@ def clock(rig: Rig) -> str:
     """Bridge time is mapped to the host's: how far two mappings, half a run apart, differ at the end."""
     rig.require()
     run = rig.stream
-    require(run.half is not None and run.clock is not None, "whiskerd tells no clock")
+    require(run.half is not None and run.clock is not None, "whiskerd reports no clock")
     text, wrong = judge_clock(run.half, run.clock)
     if rig.simulated:
         return f"{text} (simulated time: reported, not judged)"

@@ -25,7 +25,7 @@ NOBODY = 65534
 ASLEEP = Path("/run/asleep")
 WHEELS_M_S = 0.1
 ORDER_S = 0.1  # an order lasts 0.3 s
-STILL_M = 0.002  # what a base may still tell when it stands
+STILL_M = 0.002  # what a base may still report when it stands
 MOTION_M = 0.05
 
 
@@ -33,7 +33,7 @@ MOTION_M = 0.05
 
 
 def show(unit: str, name: str) -> str:
-    """A property of a unit, as systemd tells it."""
+    """A property of a unit, as systemd reports it."""
     return command("systemctl", "show", "--property", name, "--value", unit).strip()
 
 
@@ -269,7 +269,7 @@ def base_client(port: str):
 
 
 def health(port: str) -> dict[str, str]:
-    """What a base tells of itself."""
+    """What a base reports of itself."""
     with base_client(port) as say:
         return dict(pair.split("=", 1) for pair in say("health").split()[1:])
 

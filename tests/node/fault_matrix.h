@@ -49,7 +49,7 @@ struct fault_outcome {
 struct fault_outcome fault_run(const struct fault_case *row, const struct sim_node_parameters *parts);
 
 /* What a node counted, as text; and what it should have counted if `letters` are all that happened: each tick once, but
- * a reset once for all the ticks that tell of it. */
+ * a reset once for all the ticks that report it. */
 void fault_counted(const sim_node *node, char text[FAULT_TEXT]);
 void fault_reported(const char *letters, char text[FAULT_TEXT]);
 

@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-/* What can break. Faults that sound frames hide (a frozen sensor) are left out: nothing in-band can tell them. */
+/* What can break. Faults that sound frames hide (a frozen sensor) are left out: nothing in-band can show them. */
 #define STORM_KINDS(X)                                                                                                 \
     X(FLIP_BIT, 60)                                                                                                    \
     X(FLIP_TWO, 60)                                                                                                    \

@@ -1,5 +1,5 @@
-/* The supply fails at each step of an update, and at any time: the node tells, what then runs is whole, and the next
- * update succeeds. WHISKER_CUTS=n: cuts at random times, 150 by default. With an argument: writes the table of the
+/* The supply fails at each step of an update, and at any time: the node reports it, what then runs is whole, and the
+ * next update succeeds. WHISKER_CUTS=n: cuts at random times, 150 by default. With an argument: writes the table of the
  * steps there, as JSON; a second one is how many nodes of each. */
 #include <setjmp.h>
 #include <stdarg.h>

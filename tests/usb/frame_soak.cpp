@@ -143,7 +143,8 @@ void FrameSoak::request()
     expect(data.size() == question.size);
 }
 
-// A packet whose ACK was lost would come again as DATA0, and no host could tell: section 9.4.5 of USB 2.0 says as much.
+// A packet whose ACK was lost would come again as DATA0, and no host could tell it from a new one: section 9.4.5 of
+// USB 2.0.
 void FrameSoak::halt_and_clear()
 {
     if (copy_pending_ || host_.armed() != WireFault::NONE) {

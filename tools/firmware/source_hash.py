@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints the SHA-256 of the firmware's sources as the chip's compiler sees them: without comments, white space and unused macros.
 
-firmware/images/SOURCES holds that of the committed images, so that a test tells when the sources have gone on without them.
+firmware/images/SOURCES holds that of the committed images, so that a test shows when the sources have changed since.
 """
 
 import hashlib

@@ -161,7 +161,7 @@ static void whisker_base_guard_watch_driver(struct guard *guard)
     }
 }
 
-/* Passes on the wish to stop; from now on the driver has to end, also one that had not to tell that it lives. */
+/* Passes on the wish to stop; from now on the driver has to end, also one without a deadline for signs of life. */
 static void whisker_base_guard_end_driver(struct guard *guard)
 {
     daemon_notify_stopping();

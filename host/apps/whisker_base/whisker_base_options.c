@@ -103,7 +103,7 @@ static const struct command_option OPTIONS[] = {
     OWN("requested-sigma", "X", "the same where requested speeds are integrated (0.1)", number),
     OWN("drift", "RAD_PER_M", "standard deviation of the heading per distance (0.05)", number),
     {"wait", NULL, "wait for the port instead of failing when there is none", COMMAND_FLAG, AT(wait), 0, 0, NULL},
-    {"verbose", NULL, "tell also what goes well", COMMAND_FLAG, AT(verbose), 0, 0, NULL},
+    {"verbose", NULL, "log successful steps, too", COMMAND_FLAG, AT(verbose), 0, 0, NULL},
 };
 
 static const struct command_line LINE = {

@@ -185,7 +185,7 @@ static bool whisker_base_robot_moving(const struct base_robot *robot)
     return robot->speeds.left_mm_s != 0 || robot->speeds.right_mm_s != 0;
 }
 
-/* Frames that time says are missing, beside those the bytes tell of: the line was gone or silent. */
+/* Frames that time says are missing, beside those that the bytes show: the line was gone or silent. */
 static uint32_t whisker_base_robot_frames_of_gap(const struct base_robot *robot, int64_t now_ms)
 {
     const int64_t gap_ms = now_ms - robot->frame_ms;

@@ -50,7 +50,7 @@ struct base_robot {
     struct create_frame frame;   /* newest */
     struct create_speeds speeds; /* ordered last */
     enum create_oi_mode wanted;
-    int32_t mode_offset; /* some firmwares tell a mode one higher than it is */
+    int32_t mode_offset; /* some firmwares report a mode one higher than it is */
     uint32_t frames_since_mode;
     bool entered;           /* the wanted mode was seen in force since it was last asked for */
     bool low, reported_low; /* battery */

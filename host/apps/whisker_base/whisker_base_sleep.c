@@ -92,7 +92,7 @@ static int sleep_match(struct base_sleep *sleep, const char *signal)
                                      NULL, sleep);
 }
 
-/* A bus that is gone tells nothing any more, so nothing is held because of what it announced. */
+/* A bus that is gone sends nothing any more, so nothing is held because of what it announced. */
 static void sleep_lose(struct base_sleep *sleep, int error)
 {
     sleep_log_missing(sleep, strerror(-error));
@@ -139,7 +139,7 @@ void base_sleep_begin(struct base_sleep *sleep, base_on_sleep *on_sleep, void *c
     sleep_open(sleep);
 }
 
-/* Until the bus wants to be looked after, by its own clock; it never tells a time when it has nothing to wait for. */
+/* Until the bus wants to be looked after, by its own clock; it gives no time when it has nothing to wait for. */
 static int64_t sleep_bus_due_ms(const struct base_sleep *sleep, int64_t now_ms)
 {
     uint64_t due_us;

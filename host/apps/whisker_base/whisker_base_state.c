@@ -33,14 +33,14 @@ static const char *whisker_base_state_mode_reason(const struct base_robot *robot
                                                             : "its own decision; look at its buttons and battery";
 }
 
-/* Nobody has asked for a higher mode than the wanted: a base that tells one for long counts them differently. */
+/* Nobody has asked for a higher mode than the wanted: a base that reports one for long counts them differently. */
 static void whisker_base_state_watch_mode_offset(struct base_robot *robot)
 {
     robot->frames_since_mode++;
     if (!robot->entered && robot->frames_since_mode >= MODE_FRAMES && robot->wanted >= CREATE_OI_MODE_SAFE &&
         base_robot_mode_reported(robot) == (int32_t)robot->wanted + 1) {
         robot->mode_offset = 1;
-        daemon_log(LOG_NOTE, "%s: this firmware tells modes one higher than they are", robot->options->port);
+        daemon_log(LOG_NOTE, "%s: this firmware reports modes one higher than they are", robot->options->port);
     }
 }
 

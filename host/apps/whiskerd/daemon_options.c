@@ -66,7 +66,7 @@ static const struct command_option OPTIONS[] = {
      daemon_options_set_bridge},
     {"pattern", NULL, "records of the bridge's own in place of the nodes': proves FPGA, FIFO and USB", COMMAND_OWN, 0,
      0, 0, daemon_options_set_bridge},
-    {"verbose", NULL, "tell also what goes well", COMMAND_FLAG, AT(verbose), 0, 0, NULL},
+    {"verbose", NULL, "log successful steps, too", COMMAND_FLAG, AT(verbose), 0, 0, NULL},
 };
 
 static const struct command_line LINE = {

@@ -55,7 +55,7 @@ void daemon_stream_keep_house(struct daemon_stream *stream);
 /* Clock mapping and statistics into the ring. */
 void daemon_stream_report(struct daemon_stream *stream);
 
-/* Closes the bridges; tells readers and log the last of it. Returns false if a bridge sent malformed frames. */
+/* Closes the bridges; passes the last of it to readers and log. Returns false if a bridge sent malformed frames. */
 bool daemon_stream_end(struct daemon_stream *stream);
 
 #endif

@@ -1,20 +1,20 @@
 /*
  * Whether a Create 1 keeps or drops what is less than a unit, from every settled frame of straight drives and turns.
  *
- * Wheels that were asked for x units a frame turn by x within SPREAD. A firmware that keeps remainders then tells one
- * of the two whole numbers about that, each as often as its distance from the other; one that drops them tells the
+ * Wheels that were asked for x units a frame turn by x within SPREAD. A firmware that keeps remainders then reports one
+ * of the two whole numbers about that, each as often as its distance from the other; one that drops them reports the
  * lower one, always. Each way is tested by Page's test (Biometrika 41, 1954): the sum of log(chance on average if the
  * other way counts / greatest chance if this way counts), never below 0; the greatest over all motions within SPREAD,
  * so that no wheel error speaks against a way that is in use. The chance that such a sum reaches S within n frames
- * is below n exp(-S): S = FIRST for the first verdict, REVISED to change it. A body that stands tells nothing, and too
- * little is never evidence that remainders are dropped; the sums outlast interruptions, and go on: another base is
+ * is below n exp(-S): S = FIRST for the first verdict, REVISED to change it. A body that stands gives no evidence, and
+ * too little is never evidence that remainders are dropped; the sums outlast interruptions, and go on: another base is
  * noticed.
  */
 #include <math.h>
 
 #include "odometry.h"
 
-/* Chance of a number that neither way tells: an uneven period, damage that the sum of a frame does not show. */
+/* Chance of a number that neither way reports: an uneven period, damage that the sum of a frame does not show. */
 #define STRAY 0.01
 #define FIRST 12
 #define REVISED 20
@@ -48,8 +48,8 @@ static struct chances remainder_if_dropped(double least, double most, double rep
 }
 
 /* A number reported for a motion that was asked for, both in units and in the direction of that motion. What neither
- * way tells, as of a body that stands or is held back, weighs nothing. Nor does 0 against kept remainders where dropped
- * ones would tell it: a body that stands tells it too. */
+ * way reports, as of a body that stands or is held back, weighs nothing. Nor does 0 against kept remainders where
+ * dropped ones would report it: a body that stands reports it, too. */
 static void remainder_weigh(struct create_evidence *evidence, double asked, double reported)
 {
     const double least = asked * (1 - ODOMETRY_SPREAD), most = asked * (1 + ODOMETRY_SPREAD);

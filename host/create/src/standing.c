@@ -1,7 +1,7 @@
 /*
  * A body that was asked to move and does not.
  *
- * Every frame a body that moves as asked tells at least so many units: all but the wheels' error where remainders are
+ * Every frame a body that moves as asked reports at least so many units: all but the wheels' error where remainders are
  * kept, whole units of that otherwise. What is missing of this is summed up; every reported unit cancels two, so that
  * only less than half of it lets the sum grow. Where the firmware drops remainders, or may, and less than a unit is
  * asked for, nothing is missing: a body that stands cannot be distinguished from one that moves.

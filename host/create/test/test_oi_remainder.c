@@ -70,7 +70,7 @@ static void only_a_speed_that_separates_them_is_evidence(void **state)
     assert_int_equal(base.odometry.remainder, CREATE_KEPT);
 }
 
-/* Zeros are what a body tells that stands: only whole units in a turn are evidence, and these against dropping. */
+/* Zeros are what a body reports that stands: only whole units in a turn are evidence, and these against dropping. */
 static void slow_turns_report_that_remainders_are_kept_and_never_that_they_are_dropped(void **state)
 {
     (void)state;

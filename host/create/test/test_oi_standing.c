@@ -43,7 +43,7 @@ static void a_body_that_is_held_back_is_believed_rather_than_its_orders(void **s
     assert_close(base.motion.x, 0.33 * 0.45, 0.03);
 }
 
-/* Encoders count, whatever the packets 19 and 20 of an old firmware tell: here nothing. */
+/* Encoders count, whatever the packets 19 and 20 of an old firmware report: here nothing. */
 static void encoders_report_that_a_body_stands(void **state)
 {
     (void)state;

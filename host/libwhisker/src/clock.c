@@ -94,7 +94,7 @@ static void clock_usb_report(struct whisker_clock_usb *usb, uint64_t cycles, uin
 #define JUMP_EARLY_NS 5e6
 #define JUMP_LATE_NS 20e6
 #define JUMP_POINTS 3
-/* What no arrival tells: the host's least delay from the end of a transfer to its callback. */
+/* What no arrival shows: the host's least delay from the end of a transfer to its callback. */
 #define FLOOR_NS 25e3
 /* Until there are points enough, arrivals may all have been held up: as long as a loaded machine was seen to (61 ms).
  */

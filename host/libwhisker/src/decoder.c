@@ -51,7 +51,8 @@ static size_t decoder_next_candidate(const uint8_t *bytes, size_t from)
     return found ? (size_t)(found - bytes) : WHISKER_FRAME_BYTES;
 }
 
-/* Damaged records may also be the next frame, when this one lost bytes. A header inside it tells; 0: there is none. */
+/* Damaged records may also be the next frame, when this one lost bytes. A header inside it shows it; 0: there is none.
+ */
 static size_t decoder_frame_inside(const uint8_t *bytes)
 {
     size_t at = decoder_next_candidate(bytes, 1);

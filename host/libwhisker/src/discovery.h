@@ -11,7 +11,7 @@
 int discovery_open(libusb_context *usb, const char *serial, libusb_device_handle **handle,
                    struct whisker_device_info *about);
 
-/* Is a bridge plugged in now? Looks with a context of its own: an old one hears only what udev tells. */
+/* Is a bridge plugged in now? Looks with a context of its own: an old one hears only what udev announces. */
 bool discovery_present(void);
 
 #endif

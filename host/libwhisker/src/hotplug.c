@@ -11,7 +11,7 @@
 struct whisker_hotplug {
     libusb_context *usb;
     libusb_hotplug_callback_handle callback;
-    bool watching; /* libusb tells of arrivals */
+    bool watching; /* libusb announces arrivals */
     bool arrived;
     int64_t look_at_ms;
 };
@@ -59,7 +59,7 @@ int whisker_hotplug_open(struct whisker_hotplug **hotplug)
     return WHISKER_OK;
 }
 
-/* Handles what libusb has to tell, or waits for it up to wait_ms. False: a signal came. */
+/* Handles libusb's events, or waits for it up to wait_ms. False: a signal came. */
 static bool hotplug_listen(struct whisker_hotplug *hotplug, int64_t wait_ms)
 {
     struct timeval timeout = {.tv_sec = wait_ms / 1000, .tv_usec = wait_ms % 1000 * 1000};

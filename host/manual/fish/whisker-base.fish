@@ -13,6 +13,6 @@ complete -c whisker-base -l relative-sigma -d 'standard deviation of these two s
 complete -c whisker-base -l requested-sigma -d 'the same where requested speeds are integrated (0.1)' -x
 complete -c whisker-base -l drift -d 'standard deviation of the heading per distance (0.05)' -x
 complete -c whisker-base -l wait -d 'wait for the port instead of failing when there is none'
-complete -c whisker-base -l verbose -d 'tell also what goes well'
+complete -c whisker-base -l verbose -d 'log successful steps, too'
 complete -c whisker-base -l version -d 'version of this program'
 complete -c whisker-base -l help -d 'this text'

@@ -30,7 +30,7 @@ complete -c whisker-bridge-sim -l create -d 'the base is an iRobot Create behind
 complete -c whisker-bridge-sim -l create-link -d 'where that port, a pseudo-terminal, is linked' -r
 complete -c whisker-bridge-sim -l create-drop-remainder -d 'distance and angle forget, when read, what is less than a unit'
 complete -c whisker-bridge-sim -l create-battery-low -d 'begin with 3 % of the charge'
-complete -c whisker-bridge-sim -l create-mode-plus-one -d 'firmware that tells a mode one higher than it is'
+complete -c whisker-bridge-sim -l create-mode-plus-one -d 'firmware that reports a mode one higher than it is'
 complete -c whisker-bridge-sim -l create-old-angle -d 'firmware up to 3.4.0: angles multiplied by 0.324056'
 complete -c whisker-bridge-sim -l create-old-distance -d 'firmware before 3.3.0: distance and radius multiplied by F' -x
 complete -c whisker-bridge-sim -l create-lose-bytes -d 'share of the bytes it sends that are lost' -x

@@ -5,7 +5,7 @@ complete -c whisker-create-sim -l arena -d 'flat scene file of its surroundings,
 complete -c whisker-create-sim -l seed -d 'seed of the wheels'\'' errors and of the line'\''s faults (1)' -x
 complete -c whisker-create-sim -l drop-remainder -d 'distance and angle forget, when read, what is less than a unit'
 complete -c whisker-create-sim -l battery-low -d 'begin with 3 % of the charge'
-complete -c whisker-create-sim -l mode-plus-one -d 'firmware that tells a mode one higher than it is'
+complete -c whisker-create-sim -l mode-plus-one -d 'firmware that reports a mode one higher than it is'
 complete -c whisker-create-sim -l old-angle -d 'firmware up to 3.4.0: angles multiplied by 0.324056'
 complete -c whisker-create-sim -l old-distance -d 'firmware before 3.3.0: distance and radius multiplied by F' -x
 complete -c whisker-create-sim -l lose-bytes -d 'share of the bytes it sends that are lost' -x

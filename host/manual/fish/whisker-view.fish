@@ -11,5 +11,5 @@ complete -c whisker-view -l zenoh-config -d 'zenoh'\''s own configuration (JSON5
 complete -c whisker-view -l port -d '0 takes a free one (default: 8028)' -x
 complete -c whisker-view -l host -d 'address to serve at (default: 127.0.0.1)' -x
 complete -c whisker-view -l allow-host -d 'also answer under this name, as behind a forwarded port; repeatable' -x
-complete -c whisker-view -l allow-pose -d 'pages may tell where the robot is; on loopback they may anyway'
+complete -c whisker-view -l allow-pose -d 'pages may set where the robot is; on loopback they always may'
 complete -c whisker-view -l open -d 'open the page in a browser'

@@ -25,8 +25,8 @@ complete -c whisker -n 'not __fish_seen_subcommand_from examples info top view d
 complete -c whisker -n 'not __fish_seen_subcommand_from examples info top view doctor calibrate bridge-sim flash record replay export stream robot pilot navigator ros2 foxglove bag pyro localise map scene bench texture radial' -f -a map -d 'a map of an unknown arena by touch alone, from the rows of a scene folder'
 complete -c whisker -n 'not __fish_seen_subcommand_from examples info top view doctor calibrate bridge-sim flash record replay export stream robot pilot navigator ros2 foxglove bag pyro localise map scene bench texture radial' -f -a scene -d 'make scene folders for localise'
 complete -c whisker -n 'not __fish_seen_subcommand_from examples info top view doctor calibrate bridge-sim flash record replay export stream robot pilot navigator ros2 foxglove bag pyro localise map scene bench texture radial' -f -a bench -d 'score estimates of any engine on a fixed list of scenes and logs'
-complete -c whisker -n 'not __fish_seen_subcommand_from examples info top view doctor calibrate bridge-sim flash record replay export stream robot pilot navigator ros2 foxglove bag pyro localise map scene bench texture radial' -f -a texture -d 'learn and tell floor surfaces'
-complete -c whisker -n 'not __fish_seen_subcommand_from examples info top view doctor calibrate bridge-sim flash record replay export stream robot pilot navigator ros2 foxglove bag pyro localise map scene bench texture radial' -f -a radial -d 'learn and tell the distance of contacts along a whisker'
+complete -c whisker -n 'not __fish_seen_subcommand_from examples info top view doctor calibrate bridge-sim flash record replay export stream robot pilot navigator ros2 foxglove bag pyro localise map scene bench texture radial' -f -a texture -d 'learn and classify floor surfaces'
+complete -c whisker -n 'not __fish_seen_subcommand_from examples info top view doctor calibrate bridge-sim flash record replay export stream robot pilot navigator ros2 foxglove bag pyro localise map scene bench texture radial' -f -a radial -d 'learn and estimate the distance of contacts along a whisker'
 complete -c whisker -n '__fish_seen_subcommand_from examples' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from examples' -l help -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from info' -s h -d 'show this help message and exit'
@@ -55,7 +55,7 @@ complete -c whisker -n '__fish_seen_subcommand_from view' -l zenoh-config -d 'ze
 complete -c whisker -n '__fish_seen_subcommand_from view' -l port -d '0 takes a free one (default: 8028)' -x
 complete -c whisker -n '__fish_seen_subcommand_from view' -l host -d 'address to serve at (default: 127.0.0.1)' -x
 complete -c whisker -n '__fish_seen_subcommand_from view' -l allow-host -d 'also answer under this name, as behind a forwarded port; repeatable' -x
-complete -c whisker -n '__fish_seen_subcommand_from view' -l allow-pose -d 'pages may tell where the robot is; on loopback they may anyway'
+complete -c whisker -n '__fish_seen_subcommand_from view' -l allow-pose -d 'pages may set where the robot is; on loopback they always may'
 complete -c whisker -n '__fish_seen_subcommand_from view' -l open -d 'open the page in a browser'
 complete -c whisker -n '__fish_seen_subcommand_from doctor' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from doctor' -l help -d 'show this help message and exit'
@@ -289,7 +289,7 @@ complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subco
 complete -c whisker -n '__fish_seen_subcommand_from texture; and not __fish_seen_subcommand_from train classify' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from texture; and not __fish_seen_subcommand_from train classify' -l help -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from texture; and not __fish_seen_subcommand_from train classify' -f -a train -d 'learn from one folder per surface, one CSV per recording'
-complete -c whisker -n '__fish_seen_subcommand_from texture; and not __fish_seen_subcommand_from train classify' -f -a classify -d 'tell the surface window by window'
+complete -c whisker -n '__fish_seen_subcommand_from texture; and not __fish_seen_subcommand_from train classify' -f -a classify -d 'classify the surface window by window'
 complete -c whisker -n '__fish_seen_subcommand_from texture; and __fish_seen_subcommand_from train' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from texture; and __fish_seen_subcommand_from train' -l help -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from texture; and __fish_seen_subcommand_from train' -l out -d '' -r
@@ -305,8 +305,8 @@ complete -c whisker -n '__fish_seen_subcommand_from texture; and __fish_seen_sub
 complete -c whisker -n '__fish_seen_subcommand_from radial; and not __fish_seen_subcommand_from fit predict follow' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from radial; and not __fish_seen_subcommand_from fit predict follow' -l help -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from radial; and not __fish_seen_subcommand_from fit predict follow' -f -a fit -d 'fit contacts of known radius'
-complete -c whisker -n '__fish_seen_subcommand_from radial; and not __fish_seen_subcommand_from fit predict follow' -f -a predict -d 'tell the radius of each contact'
-complete -c whisker -n '__fish_seen_subcommand_from radial; and not __fish_seen_subcommand_from fit predict follow' -f -a follow -d 'tell where each contact is while it is pressed'
+complete -c whisker -n '__fish_seen_subcommand_from radial; and not __fish_seen_subcommand_from fit predict follow' -f -a predict -d 'estimate the radius of each contact'
+complete -c whisker -n '__fish_seen_subcommand_from radial; and not __fish_seen_subcommand_from fit predict follow' -f -a follow -d 'estimate where each contact is while it is pressed'
 complete -c whisker -n '__fish_seen_subcommand_from radial; and __fish_seen_subcommand_from fit' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from radial; and __fish_seen_subcommand_from fit' -l help -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from radial; and __fish_seen_subcommand_from fit' -l out -d '' -r

@@ -17,6 +17,6 @@ complete -c whiskerd -l sample-point -d 'cycles of 60 MHz from shifting to sampl
 complete -c whiskerd -l tick-in -d 'ticks begin with the rising or the falling edges of the bridge'\''s pin tick_in, a tick period apart: another bridge'\''s tick_out, a camera, a PPS' -x
 complete -c whiskerd -l every-frame -d 'the bridge sends each frame at once instead of two in a packet'
 complete -c whiskerd -l pattern -d 'records of the bridge'\''s own in place of the nodes'\'': proves FPGA, FIFO and USB'
-complete -c whiskerd -l verbose -d 'tell also what goes well'
+complete -c whiskerd -l verbose -d 'log successful steps, too'
 complete -c whiskerd -l version -d 'version of this program'
 complete -c whiskerd -l help -d 'this text'

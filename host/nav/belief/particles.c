@@ -6,7 +6,7 @@
 
 #include "mixture.h"
 
-/* Poses that tell which places of the map a row is about. */
+/* Poses that show which places of the map a row is about. */
 enum { MAP_POSES = 8 };
 
 enum { TRIES = 64, PLAIN = 5, WITH_ODOMETRY = 9 };

@@ -49,7 +49,7 @@ void nav_particles_move(struct nav_particles *, struct nav_pose step, const stru
 
 /* Multiplies the weights by the likelihood of the row last read and normalises. A particle that stands where the map
  * is not free gets no weight while another is free. Returns the log of the mean likelihood. mass: of the belief that
- * the particles hold, with which they tell the measurement models what they expect (trust.h); below 0: they tell
+ * the particles hold, with which they report to the measurement models what they expect (trust.h); below 0: they report
  * nothing. */
 double nav_particles_weigh(struct nav_particles *, struct nav_likelihood *, double mass);
 

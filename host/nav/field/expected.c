@@ -75,7 +75,7 @@ static size_t expected_code_width(int whiskers)
     return whiskers > 2 ? (size_t)whiskers : 2;
 }
 
-/* Takes the signatures over from the book, whose keys begin with the byte that tells free from blocked. */
+/* Takes the signatures over from the book, whose keys begin with the byte for free or blocked. */
 static int expected_keep_codes(struct nav_expected *e, const struct nav_book *book)
 {
     size_t whiskers = (size_t)e->whiskers;

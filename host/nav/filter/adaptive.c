@@ -260,9 +260,9 @@ static void adaptive_keep_particles(struct adaptive *a)
     adaptive_kidnap_clear(&a->kidnap, a->likelihood, a->log.head);
 }
 
-/* Hypotheses are too few to tell what several modes weigh: the histogram tells. It sleeps when one is left, draws them
- * anew where it holds more than they do, and begins again from them where it has lost what they hold: its cells are
- * coarse, and a robot may stand where all of them are blocked. */
+/* Hypotheses are too few to estimate the weights of several modes: the histogram does. It stops when one is left, draws
+ * them anew where it holds more than they do, and begins again from them where it has lost what they hold: its cells
+ * are coarse, and a robot may stand where all of them are blocked. */
 static void adaptive_weigh_modes(struct adaptive *a)
 {
     struct nav_mode mode[NAV_MODES_MOST];
@@ -294,7 +294,7 @@ static void adaptive_drop_particles(struct adaptive *a)
     nav_map_forget(a->likelihood);
 }
 
-/* The Gaussian does not tell it as well any more: hypotheses are drawn from it. */
+/* The Gaussian does not estimate the pose as well any more: hypotheses are drawn from it. */
 static void adaptive_scatter(struct adaptive *a)
 {
     a->gaussian.carries = false;
@@ -369,7 +369,7 @@ static void adaptive_predict(void *self, const struct nav_motion *motion)
     a->pending_unknown = a->pending_unknown || motion->unknown_m > 0.0 || motion->unknown_rad > 0.0;
 }
 
-/* Whether a Gaussian tells it as well: both take the same rows, from where the cloud is one compact mode. */
+/* Whether a Gaussian estimates the pose as well: both take the same rows, from where the cloud is one compact mode. */
 static void adaptive_compare(struct adaptive *a, double cloud, double gaussian)
 {
     struct adaptive_gaussian *g = &a->gaussian;

@@ -12,8 +12,8 @@ static const double WIDER = 4.0;
 /* Rows that fade, that a comparison takes, and that pass until the next when one has failed. */
 enum { KEPT = 64, COMPARED = 128, PAUSE = 256 };
 
-/* Nats: odds of twenty to one, which is also what the rows that fade may tell while it is compared; and what they may
- * while it carries. */
+/* Nats: odds of twenty to one, which is also the most information of recent rows while it is compared; and what they
+ * may while it carries. */
 static const double SURE = 3.0, TOLD_MOST = 5.0;
 
 /* Log-likelihood of a row where the robot could stand at no point. */
@@ -72,8 +72,8 @@ static int gaussian_look_up(const struct adaptive_gaussian *g, double scale, dou
     return free;
 }
 
-/* Log of the row's mean likelihood at those points, and what it tells of them: the divergence of their weights from
- * equal ones. */
+/* Log of the row's mean likelihood at those points, and its information about them: the divergence of their weights
+ * from equal ones. */
 static double gaussian_weigh(const struct adaptive_gaussian *g, double scale, double mass, double *reported)
 {
     double loglik[POINTS], best = -INFINITY, sum = 0.0, product = 0.0;

@@ -1,8 +1,8 @@
-/* The adaptive filter's least belief: one Gaussian, and whether it tells the robot's place as well as particles would.
+/* The adaptive filter's least belief: one Gaussian, and whether it estimates the pose as well as particles would.
  *
  * It is corrected as by the extended Kalman filter. Beside that the full likelihood of every row is looked up at a few
- * points of the Gaussian, which tells three things: how well it explained the row, for the kidnap test
- * (adaptive_kidnap.h) and for a comparison with the particles; how much the row tells beyond what was known, where a
+ * points of the Gaussian, which gives three figures: how well it explained the row, for the kidnap test
+ * (adaptive_kidnap.h) and for a comparison with the particles; the row's information beyond what was known, where a
  * product of many weak factors stays normal and one of few strong ones does not; and whether a wider Gaussian would
  * have explained the rows better. */
 #ifndef NAV_ADAPTIVE_GAUSSIAN_H

@@ -384,7 +384,7 @@ long adaptive_global_list(const struct adaptive_global *g, const struct adaptive
     return nav_histogram_components(&g->histogram, &since, mass, out, room);
 }
 
-/* Cells half as wide as the finest detail that a sensor tells, where that is less than the setting's. */
+/* Cells half as wide as the finest detail that a sensor resolves, where that is less than the setting's. */
 static int global_levels(struct adaptive_global *g, struct nav_levels *levels, double *detail)
 {
     const struct nav_problem *problem = g->problem;

@@ -31,9 +31,9 @@ void nav_filter_step(struct nav_filter *, const struct nav_row *, struct nav_est
  * many there are, which may exceed `room`. For judging and drawing, not for the timed path. */
 long nav_filter_components(const struct nav_filter *, struct nav_component *out, long room);
 
-/* How finely a filter divides the arena, and how finely what its sensors tell asks it to; 0: it has no cells. A cell
+/* How finely a filter divides the arena, and how finely its sensors resolve it; 0: it has no cells. A cell
  * above `wanted_m` is what its budget allows. start_m: cells in which it looks for a place that is not known at all,
- * where these are too wide for what its sensors tell; else 0. */
+ * where these are too wide for its sensors; else 0. */
 struct nav_resolution {
     double m, rad, wanted_m, start_m;
 };

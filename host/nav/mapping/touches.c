@@ -97,7 +97,7 @@ static struct touches_sums touches_sum(const struct nav_touches *t, uint64_t on,
     return s;
 }
 
-/* Least squares of `off` by `along`. False: the contacts are in no row, or tell its direction too badly. */
+/* Least squares of `off` by `along`. False: the contacts are in no row, or fix its direction too badly. */
 static bool touches_regress(const struct nav_touches *t, uint64_t on, double nx, double ny,
                             struct nav_touches_line *out)
 {

@@ -70,7 +70,7 @@ struct nav_measurement {
     enum nav_check (*check)(const struct nav_model *, const double *cells, uint64_t *bad);
     /* Share of a reading that is new, given how far the sensor has moved since its last one. */
     double (*novelty)(const struct nav_model *, struct nav_track *, struct nav_repeat *, const double *reading);
-    /* Whether a reading tells places apart that are much closer than tiles are wide: it may not be read at another's.
+    /* Whether a reading separates places that are much closer than tiles are wide: it may not be read at another's.
      */
     bool (*sharp)(const double *reading);
     /* What `count` sensors of the kind should meet: codes[count]. near: the arena with what is within reach; NULL:
@@ -107,7 +107,7 @@ int nav_sensors_init(struct nav_sensors *, const struct nav_arena *, const struc
                      const struct nav_settings *, double blur_m);
 void nav_sensors_free(struct nav_sensors *);
 
-/* Finest detail that any sensor tells, m, and the farthest sensor that tells it that fine, m from the centre. */
+/* Finest detail that any sensor resolves, m, and the farthest sensor that resolves it, m from the centre. */
 struct nav_detail {
     double detail, lever;
 };

@@ -2,7 +2,7 @@
  *
  * Expected is the outward normal, in the robot's frame, of the wall or box face at which the unbent whisker's line
  * ends. Where another face is as near as contacts are known to, either or their corner may be what is touched, and a
- * corner has no normal: not known there, as where the line meets nothing. A broken whisker tells any direction. */
+ * corner has no normal: not known there, as where the line meets nothing. A broken whisker reports any direction. */
 #include "measurement.h"
 
 #include <math.h>

@@ -3,8 +3,8 @@
  * Where a whisker's windows err one by one, two that agree are twice the evidence; where they err in runs (a caught
  * whisker, a classifier that is wrong about a patch), the second says little. Runs can be seen without knowing where
  * the robot is: a class said for less than half a tile's path, between two runs of another class that are no shorter,
- * was most likely wrong, and the share of such windows that are followed by another one tells how errors repeat: after
- * the first, the second and any later window of a run apart, since a caught whisker stays caught. */
+ * was most likely wrong, and how errors repeat follows from the share of such windows that are followed by another one:
+ * after the first, the second and any later window of a run apart, since a caught whisker stays caught. */
 #ifndef NAV_REPEAT_H
 #define NAV_REPEAT_H
 

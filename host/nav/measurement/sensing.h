@@ -33,7 +33,7 @@ struct nav_map_thing {
 /* What may be wrong: a tile, a box, or that nothing is at a point. */
 enum nav_map_kind { NAV_MAP_TILE, NAV_MAP_BOX, NAV_MAP_THING };
 
-/* The place that a sensor's reading tells of, and how much of the belief has it tell of that. */
+/* The place that a sensor's reading is about, and the share of the belief for which it is. */
 struct nav_map_suspect {
     enum nav_map_kind kind;
     int which; /* tile or box; -1: none */

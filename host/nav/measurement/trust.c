@@ -7,7 +7,7 @@
 static const double WORKING_MOST = 0.995, WORKING_LEAST = 0.005;
 static const double BREAKS = 1e-4, MENDS = 0.005; /* chances per reading */
 static const double RELAX = 0.02;                 /* per reading, towards trust, while the belief itself is in doubt */
-static const double SURPRISE_MOST = 2.5;          /* nats that one reading can tell */
+static const double SURPRISE_MOST = 2.5;          /* nats of one reading at most */
 static const double FADE = 0.9;                   /* of the agreement, per reading */
 static const double LEARN = 0.005;                /* of the accuracy, per window */
 

@@ -1,8 +1,8 @@
 /* Which whiskers can be believed: learned online from how readings agree with what a filter expected.
  *
- * Each whisker is taken to work or to be broken, with a small chance of changing. A filter tells, before it uses a row,
- * what its belief expects (nav_trust_begin, nav_trust_add for poses of that belief), then lets the row's readings be
- * judged (nav_trust_learn). Belief not listed counts as expecting nothing in particular, so that an unsure filter
+ * Each whisker is taken to work or to be broken, with a small chance of changing. A filter reports, before it uses a
+ * row, what its belief expects (nav_trust_begin, nav_trust_add for poses of that belief), then lets the row's readings
+ * be judged (nav_trust_learn). Belief not listed counts as expecting nothing in particular, so that an unsure filter
  * teaches nothing. A disagreement counts against a whisker only while the other whiskers agree with the belief: when
  * all disagree it is the belief that is wrong. The next row's tables use the outcome. */
 #ifndef NAV_TRUST_H

@@ -78,7 +78,7 @@ struct nav_robot {
     const struct nav_tip *tip;
     int rays;
     const struct nav_ray *ray;
-    bool normals; /* rows tell directions of the surfaces that object whiskers touch */
+    bool normals; /* rows carry directions of the surfaces that object whiskers touch */
     int sensors;
     const struct nav_sensor *sensor;
 };

@@ -157,7 +157,7 @@ static void whiskers_add_and_those_not_read_say_nothing(void **state)
     nav_likelihood_free(l);
 }
 
-/* Expected distances are rounded to codes, of which a byte holds 256: finer than what a contact can tell. */
+/* Expected distances are rounded to codes, of which a byte holds 256: finer than a contact's noise. */
 static void codes_of_a_distance_are_finer_than_its_noise_and_reach_the_tip(void **state)
 {
     (void)state;

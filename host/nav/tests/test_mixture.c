@@ -194,7 +194,7 @@ static void counts_and_sums_are_checked_too(void **state)
     assert_null(nav_prior_fault(&p.arena, &p.prior, &which));
 }
 
-/* Drawn poses, the density and the filled cells tell of one distribution. */
+/* Drawn poses, the density and the filled cells are of one distribution. */
 static void draws_density_and_cells_agree(void **state)
 {
     (void)state;

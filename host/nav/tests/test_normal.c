@@ -2,7 +2,7 @@
 #include "near.h"
 #include "rooms.h"
 
-static struct nav_problem telling(void)
+static struct nav_problem with_normals(void)
 {
     struct nav_problem p = room();
     p.robot.normals = true;
@@ -26,7 +26,7 @@ static double expected(const struct nav_problem *p, struct nav_pose at)
 static void a_face_is_expected_by_its_normal_in_the_robots_frame(void **state)
 {
     (void)state;
-    struct nav_problem p = telling();
+    struct nav_problem p = with_normals();
     /* The left side of the box, seen from its left; the same, looked at aslant. */
     assert_near(fabs(expected(&p, (struct nav_pose){0.62, 0.15, 0.0})), 180.0, 1.01);
     assert_near(expected(&p, (struct nav_pose){0.62, 0.15, 0.3}), 180.0 - 0.3 * 180.0 / NAV_PI, 1.01);
@@ -38,7 +38,7 @@ static void a_face_is_expected_by_its_normal_in_the_robots_frame(void **state)
 static void where_there_is_no_single_face_it_is_not_known(void **state)
 {
     (void)state;
-    struct nav_problem p = telling();
+    struct nav_problem p = with_normals();
     assert_true(isnan(expected(&p, (struct nav_pose){0.4, 0.5, 0.0})));    /* nothing within reach */
     assert_true(isnan(expected(&p, (struct nav_pose){0.62, 0.297, 0.0}))); /* 3 mm from the box's corner */
     assert_true(isfinite(expected(&p, (struct nav_pose){0.62, 0.29, 0.0})));
@@ -50,7 +50,7 @@ static void where_there_is_no_single_face_it_is_not_known(void **state)
 static void a_direction_is_a_wrapped_gaussian_on_a_floor_of_outliers(void **state)
 {
     (void)state;
-    struct nav_problem p = telling();
+    struct nav_problem p = with_normals();
     p.settings.normal.outlier = 0.1;
     struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.0);
     struct nav_model *m = &l->model[NORMAL];
@@ -71,7 +71,7 @@ static void a_direction_is_a_wrapped_gaussian_on_a_floor_of_outliers(void **stat
 static void bad_directions_are_counted_and_not_read(void **state)
 {
     (void)state;
-    struct nav_problem p = telling();
+    struct nav_problem p = with_normals();
     struct nav_filter *f = nav_filter_new("particle", &p);
     const double texture[] = {NAN, NAN}, nothing = NAN;
     const double bad[][2] = {{INFINITY, 0.1}, {7.0, 0.1}, {1.0, NAN}, {1.0, 0.0}, {1.0, -0.1}, {1.0, 4.0}};
@@ -98,7 +98,7 @@ static void bad_directions_are_counted_and_not_read(void **state)
 /* Spread of the heading after a face was met straight ahead, reported with or without its direction. */
 static double heading_spread(const char *filter, bool reported)
 {
-    struct nav_problem p = telling();
+    struct nav_problem p = with_normals();
     p.settings.normal.outlier = 0.05;
     p.prior.mean = (struct nav_pose){0.56, 0.15, 0.0};
     p.prior.sigma[0] = p.prior.sigma[1] = 0.02;

@@ -40,8 +40,8 @@ COMMANDS = {
     "map": "a map of an unknown arena by touch alone, from the rows of a scene folder",
     "scene": "make scene folders for localise",
     "bench": "score estimates of any engine on a fixed list of scenes and logs",
-    "texture": "learn and tell floor surfaces",
-    "radial": "learn and tell the distance of contacts along a whisker",
+    "texture": "learn and classify floor surfaces",
+    "radial": "learn and estimate the distance of contacts along a whisker",
 }
 # Commands that need more than numpy: the extra that installs it
 EXTRAS = {

@@ -27,7 +27,7 @@ EMPTY, NOT_READ, VALUE = range(3)  # of a cell; an empty distance is "no contact
 
 
 class Quantity(Enum):
-    """What the columns of a row tell, with the unit that their names end with or imply."""
+    """What the columns of a row hold, with the unit that their names end with or imply."""
 
     TEXTURE = "log-likelihood of a floor texture, nats"
     SURFACE = "log-likelihood of a face's texture, nats"

@@ -16,7 +16,7 @@ def stamp() -> str:
 
 
 def stamp_output() -> None:
-    """Standard output and error tell times from now on, if VARIABLE is set."""
+    """Standard output and error carry times from now on, if VARIABLE is set."""
     if VARIABLE in os.environ:
         sys.stdout, sys.stderr = Stamped(sys.stdout), Stamped(sys.stderr)
 

@@ -111,7 +111,7 @@ def _judged(estimates, wanted: benchmark.Entry, near_m: float) -> dict:
 
 
 def table(scene: str, scores: list[dict]) -> str:
-    """One line an engine; a dash for what it does not tell."""
+    """One line an engine; a dash for what it does not report."""
     width = max(len(scene), *(len(score["engine"]) for score in scores))
     lines = [" | ".join([f"{scene:{width}}", *(title for title, *_ in COLUMNS)])]
     for score in scores:

@@ -76,7 +76,7 @@ def fault_scores(faults: Path, bad: Path) -> dict:
 
 
 def link_scores(pilot: dict, navigator: dict) -> dict:
-    """What pilot.json and navigator.json tell of network and serial line."""
+    """What pilot.json and navigator.json hold about network and serial line."""
     base = pilot["base"]
     return {
         "rows_sent": pilot["rows"],

@@ -143,7 +143,7 @@ def write_radial_points(folder: Path, models: dict[str, RadialModel], contacts: 
 def flat(scene: Scene) -> str:
     """The scene's robot for the recording benches, which bring their own arena and start.
 
-    ValueError for a scene as a folder holds it: it does not tell which whiskers are simulated, and each batch of them
+    ValueError for a scene as a folder holds it: it does not state which whiskers are simulated, and each batch of them
     wants its own models.
     """
     if not scene.simulated:

@@ -1,7 +1,7 @@
 """The demo's robot without its signals: the pilot's own behaviour (crunchbot.pilot.behaviour) on contacts from geometry.
 
 Rows come out as the pilot makes them: odometry, textures and distances held back during a body whisk, a distance at the
-release. What a whisk tells was taken from signal-level runs, and tests/scenes/test_levels.py holds the two against each other.
+release. What a whisk measures was taken from signal-level runs, and tests/scenes/test_levels.py holds the two against each other.
 """
 
 import math

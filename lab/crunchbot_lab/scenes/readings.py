@@ -141,7 +141,7 @@ def normals(
     arena: Arena, robot: Robot, poses: np.ndarray, touched: np.ndarray, world: World, rng: np.random.Generator
 ) -> np.ndarray | None:
     """(n, rays, 2) directions of faces, robot's frame, with their standard deviation, rad; nan: not reported, as where not
-    `touched` (n, rays) or at a corner. None: this robot tells none."""
+    `touched` (n, rays) or at a corner. None: this robot reports none."""
     if world.normal_sd_rad is None:
         return None
     out = np.full((*touched.shape, 2), np.nan)

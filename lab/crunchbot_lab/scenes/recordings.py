@@ -22,7 +22,7 @@ Warn = Callable[[str], None]
 
 
 def read_recording(path: str | Path, warn: Warn = lambda line: None, kind: str = "") -> tuple[Scene, Observations]:
-    """The scene a recording was made in and its rows; a start that the recording does not tell is uniform.
+    """The scene a recording was made in and its rows; a start that the recording does not hold is uniform.
 
     `kind`: the one of READERS that it must be; empty: any. `warn` takes a line for each damage that cost rows or may have. RecordingKindError for what no reader knows;
     SceneError and TableError for a recording whose files are broken.

@@ -1,7 +1,7 @@
 """Scenes from recordings of a Thymio on a printed floor: text files of numbers, one line every 0.1 s (docs/formats.md).
 
 Two grey-level sensors look at cells of black and white. They are texture whiskers here: a reading's likelihood by class
-is a normal distribution about the class's level, and a share of readings at cell borders tells nothing.
+is a normal distribution about the class's level, and a share of readings at cell borders carries no information.
 """
 
 import math
@@ -71,7 +71,7 @@ def published(path: Path, observations: Observations) -> tuple[Estimates, ...]:
         table = _numbers(log, LOG_NUMBERS, more=True)
         lines = table[:, 0]
         if not ((lines >= 1) & (lines <= len(observations)) & (np.diff(lines, prepend=0) > 0)).all():
-            raise TableError(log, None, f"tells of lines outside 1 to {len(observations)}, or not in order; mend it")
+            raise TableError(log, None, f"names lines outside 1 to {len(observations)}, or not in order; mend it")
         poses = np.column_stack([table[:, 5:7] / 100.0, table[:, 7]])
         out.append(Estimates(f"published {log.suffix[1:]}", lines.astype(int) - 1, poses, step_us=table[:, 1] * 1e6))
     return tuple(out)

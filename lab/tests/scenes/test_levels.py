@@ -1,4 +1,4 @@
-"""Level 0 tells what level 1 tells: texture confusions, distances, misses and the timing of contacts of the `robot` family
+"""Level 0 and level 1 agree: texture confusions, distances, misses and the timing of contacts of the `robot` family
 agree with signal-level runs of the same robot in the same arenas. Tolerances are stated where they are used.
 """
 

@@ -47,7 +47,7 @@ def test_the_scene_has_the_images_cells_and_the_recordings_motion(recording, tmp
         assert math.remainder(pose[2] - wanted[2], 2 * math.pi) == pytest.approx(0.0, abs=1e-5)
     left, right = rows.texture[:, 0], rows.texture[:, 1]
     assert (left[:2, 0] > left[:2, 1] + 2).all() and (right[:, 1] > right[:, 0] + 2).all()
-    assert left[2, 0] == pytest.approx(left[2, 1]), "half way tells nothing"
+    assert left[2, 0] == pytest.approx(left[2, 1]), "half way carries no information"
 
 
 def test_a_recording_without_the_truth_is_one_too(recording):

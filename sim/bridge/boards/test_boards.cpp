@@ -119,20 +119,20 @@ void a_dropped_frame_lights_the_error_led(void **)
     trial.enumerated();
     trial.begin(WHISKER_LIMIT_TICK_PERIOD_MIN);
     for (uint64_t passed = 0; passed < FULL + FULL / 2; passed += MICROFRAME) {
-        trial.tells(RUNS | (passed < FULL ? 0 : trial.board().leds() & LED_ERROR));
+        trial.shows(RUNS | (passed < FULL ? 0 : trial.board().leds() & LED_ERROR));
         trial.host().start_of_frame();
         trial.host().idle(MICROFRAME);
     }
-    trial.tells(RUNS | LED_ERROR);
+    trial.shows(RUNS | LED_ERROR);
     trial.end();
     Bytes packet;
     for (uint64_t n = 0; n < 2 * FULL / WHISKER_LIMIT_TICK_PERIOD_MIN && (trial.board().leds() & LED_RUN); n++) {
         trial.host().in(BULK, WHISKER_LIMIT_BULK_PACKET, packet); // the last frame waits for room in the FIFO
         trial.host().idle(LED_DELAY);
     }
-    trial.tells(LED_PHY | LED_CONFIGURED | LED_ERROR);
+    trial.shows(LED_PHY | LED_CONFIGURED | LED_ERROR);
     trial.begin();
-    trial.tells(RUNS);
+    trial.shows(RUNS);
 }
 
 // A full-speed board that a host would take for one below its top speed shows a device qualifier, or is deaf for some

@@ -26,7 +26,7 @@ struct Kind {
     const char *name;
     BusSpeed speed;
     bool polarity; // its PHY needs a register written
-    bool leds;     // the bench sees what they tell
+    bool leds;     // the bench sees them
     std::function<std::unique_ptr<Board>(NodeBus &, const BoardFault &)> make;
 };
 class Trial
@@ -57,7 +57,7 @@ class Trial
             return control_transfer(host_, request, data);
         };
         require(host_.reset(speed_), "no device after a reset");
-        tells(LED_PHY);
+        shows(LED_PHY);
         if (!configure(transfer, descriptors, error)) {
             throw std::runtime_error(error);
         }
@@ -72,27 +72,27 @@ class Trial
         control(0);
     }
     // What the LEDs show; they follow within some cycles of the oscillator.
-    void tells(uint8_t leds)
+    void shows(uint8_t leds)
     {
         host_.idle(LED_DELAY);
-        require(!leds_ || board_->leds() == leds, "the LEDs tell something else");
+        require(!leds_ || board_->leds() == leds, "the LEDs show something else");
     }
     // A run, begun and ended; throws std::runtime_error with what is wrong.
     void runs(uint64_t ticks)
     {
         require(board_->bus_is_idle(), "the nodes' lines are not idle before a run");
-        tells(LED_PHY | LED_CONFIGURED);
+        shows(LED_PHY | LED_CONFIGURED);
         begin();
         while (check_.frames() < ticks) {
             read();
         }
-        tells(LED_PHY | LED_CONFIGURED | LED_RUN);
+        shows(LED_PHY | LED_CONFIGURED | LED_RUN);
         hears_orders();
         end();
         while (!check_.ended()) {
             read();
         }
-        tells(LED_PHY | LED_CONFIGURED);
+        shows(LED_PHY | LED_CONFIGURED);
         require(host_.counters().unexplained == 0, "transactions went wrong");
     }
 
@@ -119,7 +119,7 @@ class Trial
         whisker_put_u32(&report[WHISKER_REPORT_CONTROL_TICK_PERIOD], tick_period);
         set_report(report, WHISKER_REPORT_CONTROL_BYTES);
     }
-    // Each node tells its serial number, and the order reached it by MOSI alone.
+    // Each node reports its serial number, and the order reached it by MOSI alone.
     void hears_orders()
     {
         for (const uint8_t command : {WHISKER_SERVICE_COMMAND_INFO, WHISKER_SERVICE_COMMAND_POLL}) {

@@ -1,4 +1,4 @@
-/* What packets and groups tell. */
+/* What packets and groups hold. */
 #include "robot.h"
 
 static size_t ask_for(uint8_t id)

@@ -145,7 +145,7 @@ UsbfsServer::UsbfsServer(const UsbfsServer *beside) : state_(std::make_shared<St
     g_signal_connect(state_->handler, "handle-ioctl", G_CALLBACK(State::on_ioctl), state_.get());
 }
 
-// umockdev tells of the device before its descriptors are there, so listeners are notified once more.
+// umockdev announces the device before its descriptors are there, so listeners are notified once more.
 void UsbfsServer::plug(const Descriptors &descriptors)
 {
     GError *error = nullptr;

@@ -19,11 +19,11 @@ class UsbfsServer : public DevicePort
     explicit UsbfsServer(const UsbfsServer *beside = nullptr);
     ~UsbfsServer() override;
 
-    // Adds the device with these descriptors under a number it has not had yet, and tells udev's listeners.
+    // Adds the device with these descriptors under a number it has not had yet, and notifies udev's listeners.
     // Throws std::runtime_error with one line if that fails.
     void plug(const Descriptors &descriptors) override;
 
-    // Removes it and tells udev's listeners. Who has it open gets ENODEV once every result handed over is fetched.
+    // Removes it and notifies udev's listeners. Who has it open gets ENODEV once every result handed over is fetched.
     void unplug() override;
 
     bool host_in_real_time() const override;

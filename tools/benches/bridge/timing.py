@@ -144,7 +144,7 @@ def table(found: dict) -> str:
         f"{TRACES} traces of {TRACE_S} s, a transfer every 8 ms, from the sixth second on; the first 20 us of each "
         f"error are the host's least delay,"
     ]
-    lines += ["which no arrival tells and the stated uncertainty holds."]
+    lines += ["which no arrival shows and the stated uncertainty includes."]
     return "\n".join(lines)
 
 

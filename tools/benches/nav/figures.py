@@ -1,4 +1,4 @@
-"""From trials to the figures that the bench reports; page.py tells them."""
+"""From trials to the figures that the bench reports; page.py writes them."""
 
 from collections.abc import Callable
 

@@ -4,7 +4,7 @@
     .venv/bin/python tools/benches robot --only levels page    some parts; --levels 0 1: of the levels only the fast
     ones
 
-An interrupted run goes on where it stopped, seed by seed; `page` tells what there is so far.
+An interrupted run goes on where it stopped, seed by seed; `page` shows what there is so far.
 """
 
 import argparse

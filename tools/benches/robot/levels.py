@@ -42,7 +42,7 @@ FIRST_SEED = 8101
 POSES = ("x_m", "y_m", "theta_rad")
 FAR_M = 0.03  # a contact may be so far beyond the whisker's straight tip
 INTERVAL, DRAWS = (2.5, 97.5), 10_000
-LEAST_SEEDS = 5  # of an interval that is worth telling
+LEAST_SEEDS = 5  # of an interval that is worth reporting
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ def poses_of(truth: list[dict]) -> np.ndarray:
 
 
 def distance_scores(rows: list[dict], poses: np.ndarray, scene: Scene) -> dict:
-    """How many distances the rows tell, and their root mean square error, m; of what the whisker did not meet nothing
+    """How many distances the rows hold, and their root mean square error, m; of what the whisker did not meet nothing
     is said."""
     errors = []
     for whisker in scene.robot.of_role("object"):

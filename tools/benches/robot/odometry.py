@@ -1,4 +1,4 @@
-"""What the base's driver tells of straight lines and turns, against the truth: both Creates, remainder kept and
+"""What the base's driver reports of straight lines and turns, against the truth: both Creates, remainder kept and
 dropped.
 
 Emulator and driver in one process, on an open floor, with the wheel errors of sim/world: a scale of 1 % for a run and 2

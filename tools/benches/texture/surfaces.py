@@ -1,4 +1,4 @@
-"""Faces of walls: what a tip that slides along one tells of its texture, by speed and motion, and what the texture
+"""Faces of walls: what a tip that slides along one measures of its texture, by speed and motion, and what the texture
 costs the contact filter."""
 
 import math

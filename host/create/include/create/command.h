@@ -19,7 +19,7 @@ extern "C" {
 
 #define CREATE_COMMAND_BYTES 64
 
-/* Wheel speeds in whole mm/s as the order tells them, and what they make of the robot: really driven, not asked for. */
+/* Wheel speeds in whole mm/s as in the order, and the motion that follows: really driven, not asked for. */
 struct create_speeds {
     int left_mm_s, right_mm_s;
     double v_m_s, omega_rad_s;

@@ -22,7 +22,7 @@ struct create_step {
     double scale_distance, scale_angle,
         scale_drift;                    /* standard deviations that are the same in every step: m, rad, rad */
     double loose_distance, loose_angle; /* independent ones: m, rad */
-    double grain_distance, grain_angle; /* units in which the counters tell: m, rad */
+    double grain_distance, grain_angle; /* units of the counters: m, rad */
 };
 
 /* All zero: no motion. */

@@ -1,10 +1,10 @@
 /*
  * What the base says about its motion, frame by frame, made into steps with errors.
  *
- * Create 1 tells whole millimetres and degrees since they were last read. Some firmwares keep what is less than a unit
- * for the next time, some drop it: then the body whisk (pi/24 rad/s, 0.11 degrees per frame of 15 ms) reads as no turn
- * at all. Where that is possible the speeds that the base was asked for are integrated instead. Create 2 has encoders.
- * The policy says which source counts. Pure: no allocation, no I/O.
+ * Create 1 reports whole millimetres and degrees since they were last read. Some firmwares keep what is less than a
+ * unit for the next time, some drop it: then the body whisk (pi/24 rad/s, 0.11 degrees per frame of 15 ms) reads as no
+ * turn at all. Where that is possible the speeds that the base was asked for are integrated instead. Create 2 has
+ * encoders. The policy says which source counts. Pure: no allocation, no I/O.
  */
 #ifndef CREATE_ODOMETRY_H
 #define CREATE_ODOMETRY_H
@@ -31,7 +31,7 @@ enum create_source {
 
 enum create_remainder { CREATE_UNKNOWN, CREATE_KEPT, CREATE_DROPPED };
 
-/* Whether the body moves as the wheels were asked to, as far as the base tells it. */
+/* Whether the body moves as the wheels were asked to, as far as the base reports it. */
 enum create_standing {
     CREATE_MOVES,      /* or was not asked to */
     CREATE_STANDS,     /* less than half of the motion, over some frames */

@@ -89,10 +89,10 @@ void whisker_clock_begin(struct whisker_clock_fit *fit, uint32_t clock_hz, int64
 
 /*
  * A frame of the bridge's time `cycles` has arrived just now, by both of the host's clocks; usb_time is that of its
- * header (0: not known). Of frames that come together the last one tells most. When the host's clock goes back, when
- * the clocks run apart by more than a crystal can, or, without usb_time, when cycles go back (the bridge was started
- * again), the fit begins anew.
- * Returns 0, or HOST_CLOCK: CLOCK_MONOTONIC went back, or CLOCK_REALTIME was set by more than 10 ms.
+ * header (0: not known). Of frames that come together the last one has the least delay. When the host's clock goes
+ * back, when the clocks run apart by more than a crystal can, or, without usb_time, when cycles go back (the bridge was
+ * started again), the fit begins anew. Returns 0, or HOST_CLOCK: CLOCK_MONOTONIC went back, or CLOCK_REALTIME was set
+ * by more than 10 ms.
  */
 int whisker_clock_add(struct whisker_clock_fit *fit, uint64_t cycles, uint16_t usb_time, int64_t monotonic_ns,
                       int64_t realtime_ns);

@@ -28,7 +28,7 @@ struct whisker_identity {
     uint16_t frame_bytes;
     uint16_t fifo_bytes;
     uint8_t board;       /* a number of `boards` in protocol.md */
-    uint8_t wired_lanes; /* that have a pin; 0: gateware before version 3 does not tell */
+    uint8_t wired_lanes; /* that have a pin; 0: gateware before version 3 does not report it */
     uint16_t build;      /* first 16 bits of the gateware's commit; 0: not known */
 };
 
@@ -168,7 +168,7 @@ int whisker_hotplug_open(struct whisker_hotplug **hotplug);
 
 /*
  * Waits until a bridge is there that was not reported yet; also reports one that is there every second, so that
- * opening it is tried again, and so that it works where no udev tells of new devices. Returns 0: try to open; TIMEOUT
+ * opening it is tried again, and so that it works where no udev announces new devices. Returns 0: try to open; TIMEOUT
  * (also after a signal).
  */
 int whisker_hotplug_wait(struct whisker_hotplug *hotplug, int timeout_ms);

@@ -1,7 +1,7 @@
 /*
  * The ring: the last frames in POSIX shared memory. One process writes, any number read; a reader maps it read-only, so
  * it can neither block nor corrupt it, and may be killed at any instruction. The memory is mapped twice in a row, so
- * any window of frames is one array. Frames are used where they lie: peek, use, advance; advance tells whether the
+ * any window of frames is one array. Frames are used where they lie: peek, use, advance; advance reports whether the
  * writer overtook the reader meanwhile, in which case what was used must be thrown away.
  *
  * Places and trust: the service's ring lies in a directory that only the service can write, every other ring where any
@@ -184,8 +184,8 @@ void whisker_ring_set_stats(struct whisker_ring *ring, const struct whisker_daem
  * is closed. Returns 0, RING_ACCESS (another user's file is in the way), SYSTEM. */
 int whisker_ring_set_nodes(struct whisker_ring *ring, const char *text);
 
-/* Removes the name, tells the readers that the stream has ended, and lets go; what they hold they can finish reading.
- * NULL is allowed. */
+/* Removes the name, lets the readers know that the stream has ended, and lets go; what they hold they can finish
+ * reading. NULL is allowed. */
 void whisker_ring_close(struct whisker_ring *ring);
 /* cffi: end */
 

@@ -1,4 +1,4 @@
-/* What whiskerd tells of itself, in its ring: read by anyone who reads the ring. */
+/* What whiskerd reports of itself, in its ring: read by anyone who reads the ring. */
 #ifndef WHISKER_STATS_H
 #define WHISKER_STATS_H
 

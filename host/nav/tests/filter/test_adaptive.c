@@ -289,7 +289,7 @@ static struct nav_estimate run_counting(struct nav_filter *f, struct wander *w, 
     return e;
 }
 
-/* Little to tell: no contacts, and odometry that is said to need little help. */
+/* Little information: no contacts, and odometry that is said to need little help. */
 static struct wander sparse_new(uint64_t seed)
 {
     struct wander w = wander_new(seed);

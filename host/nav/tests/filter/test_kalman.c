@@ -153,7 +153,7 @@ static void a_border_crossed_puts_the_tip_on_the_line(void **state)
 }
 
 /* Aslant towards the corner of four tiles: a border lies 0.01 m ahead, one of the same two textures 0.1 m to the left.
- * A belief that knows the place better than the crossing tells it takes the near one. */
+ * A belief that is surer of the place than the crossing takes the near one. */
 static void of_two_borders_that_were_it_the_likelier_is_taken(void **state)
 {
     (void)state;
@@ -195,7 +195,7 @@ static void a_texture_without_a_border_says_nothing(void **state)
     struct nav_problem p = behind_the_border();
     struct nav_kalman *k = kalman_create_extended(&p);
     for (int i = 0; i < 4; i++)
-        read_texture(k, 1); /* the belief's own tile is 0: it cannot tell */
+        read_texture(k, 1); /* the belief's own tile is 0: no information */
     assert_near(k->belief.mean.x, 0.3, 0.0);
     assert_near(k->belief.covariance[0], 0.0025, 1e-15);
     kalman_destroy(k);

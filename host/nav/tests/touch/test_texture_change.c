@@ -149,7 +149,7 @@ static int found_after(bool edge, double amplitude, double swing)
     return found;
 }
 
-/* The whisker rings in its own low bands behind an edge: there the others alone tell whether the surface is another.
+/* The whisker rings in its own low bands behind an edge: there the others alone show whether the surface is another.
  * The first block behind it is left out. */
 static void an_edge_is_a_border_only_where_the_surface_is_another(void **state)
 {

@@ -10,7 +10,7 @@
 #define LATE_FROM 0.50   /* ... and its last part gives the peak */
 #define ONSET_TO 0.70    /* ... its first part the onset */
 #define DEPART 0.04      /* of the peak: what is so far below the push's line is no longer push */
-#define AFTER_BINS 6     /* that tell the line after the push */
+#define AFTER_BINS 6     /* that fix the line after the push */
 #define BENDS 0.3        /* share of the deflection from which on a channel bends */
 #define AFTER_LEAST 0.35 /* of the peak */
 

@@ -1,4 +1,4 @@
-/* What a trace tells of its contact: when the push began, stopped and let go, how far and along which direction it bent
+/* What a trace shows of its contact: when the push began, stopped and let go, how far and along which direction it bent
  * the whisker, and how the bending grew. A whisk is rest, a push at a steady rate, perhaps a hold, and the way back; a
  * recording may end with the push.
  */

@@ -18,7 +18,7 @@ struct nav_texture_change;
 
 enum { NAV_TEXTURE_CHANGE_AFTER_LEAST = 2, NAV_TEXTURE_CHANGE_AFTER_MOST = 6, NAV_TEXTURE_CHANGE_BEFORE_MOST = 16 };
 
-/* What tells classes apart in a block. All arrays are copied. */
+/* What separates the classes in a block. All arrays are copied. */
 struct nav_texture_change_rule {
     const double *steady;        /* [F][K] inverse covariance within a drive times each class's middle */
     const double *apart;         /* [K][K] squared distance of the middles by that covariance */

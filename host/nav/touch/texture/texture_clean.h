@@ -1,4 +1,4 @@
-/* Takes out of a window what no floor writes: missing records, spikes; and tells stuck and railed channels. */
+/* Takes out of a window what no floor writes: missing records, spikes; and reports stuck and railed channels. */
 #ifndef NAV_TEXTURE_CLEAN_H
 #define NAV_TEXTURE_CLEAN_H
 

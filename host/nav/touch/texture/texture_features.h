@@ -4,7 +4,7 @@
  * whole power and log of the power of the steps from sample to sample; with `levels` also its mean, and with `shorter`
  * the mean and the standard deviation of the same logs over shorter stretches of the window. The log of one long
  * window's band errs much where the band holds few bins, and one knock fills all bands; the mean over stretches errs
- * less, and the deviation tells what comes in bursts. Of each pair of channels: Fisher's z (atanh) of their
+ * less, and the deviation shows what comes in bursts. Of each pair of channels: Fisher's z (atanh) of their
  * correlation. Means apart, an offset changes nothing, and a gain (load, whisker stiffness) moves all the powers of a
  * channel alike, which a linear rule can take out. Nothing depends on units of time: bands count cycles per window, so
  * any sampling rate will do.

@@ -147,9 +147,9 @@ def stream(ring: str, look_s: float, owner: int | None = None) -> list[Finding]:
 
 
 def daemon(stats: DaemonStats | None) -> list[Finding]:
-    """What whiskerd tells of itself and its bridge."""
+    """What whiskerd reports of itself and its bridge."""
     if stats is None:
-        return [Finding(WARN, "the ring's writer tells nothing of itself", "none needed if it is a replay")]
+        return [Finding(WARN, "the ring's writer reports nothing of itself", "none needed if it is a replay")]
     if stats.connected < max(1, stats.bridges):
         text = error_line(stats.error) if stats.error else "; it is still opening its bridge"
         missing = "no bridge" if not stats.connected else "one bridge of two"

@@ -151,7 +151,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class DaemonStats:
-    """What whiskerd tells of itself (struct whisker_daemon_stats: units and meanings are there)."""
+    """What whiskerd reports of itself (struct whisker_daemon_stats: units and meanings are there)."""
 
     frames: int
     frames_damaged: int

@@ -26,14 +26,14 @@ def add(parser: argparse.ArgumentParser) -> None:
     p.add_argument("--out", required=True, metavar="MODEL.JSON")
     p.add_argument("--model", choices=radial.MODELS, default="default", help=KINDS)
     example = "whisker radial predict examples/radial.json examples/contacts.csv --json"
-    p = add_action(actions, "predict", "tell the radius of each contact", example, predict)
+    p = add_action(actions, "predict", "estimate the radius of each contact", example, predict)
     p.add_argument("model")
     p.add_argument("contacts", help="CSV as for fit; radius_mm is not read and may be absent")
     p.add_argument("--json", action="store_true", help="one object per line and contact")
     text = "a press model's answers as each contact grows, one line for every tenth of its samples"
     p.add_argument("--during", action="store_true", help=text)
     example = "whisker radial follow examples/radial.json examples/contacts.csv --json"
-    p = add_action(actions, "follow", "tell where each contact is while it is pressed", example, follow)
+    p = add_action(actions, "follow", "estimate where each contact is while it is pressed", example, follow)
     p.add_argument("model", help="of whole whisks: 'whisker radial fit --model whisk'")
     p.add_argument("contacts", help="CSV as for fit, with whisk_rad_s or push_mm_s; radius_mm is not read")
     p.add_argument("--json", action="store_true", help="one object per line, one every 20 ms at 2 kHz")

@@ -1,4 +1,4 @@
-"""`whisker texture`: learns surfaces from recordings and tells them apart (crunchbot.touch.texture)."""
+"""`whisker texture`: learns surfaces from recordings and classifies them (crunchbot.touch.texture)."""
 
 import argparse
 import json
@@ -29,7 +29,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     p.add_argument("--speed-m-s", type=float, help=text)
     p.add_argument("--tile-m", type=float, help="length of one surface along a drive, with --speed-m-s")
     example = "whisker texture classify examples/texture.json examples/surfaces/ROUGH/1.csv --window-ms 100 --json"
-    p = add_action(actions, "classify", "tell the surface window by window", example, classify)
+    p = add_action(actions, "classify", "classify the surface window by window", example, classify)
     p.add_argument("model")
     p.add_argument("recording", help="a CSV file, or a folder as for 'train': then a confusion matrix")
     p.add_argument("--window-ms", type=float, default=100.0, help="length of a window (default: %(default)s)")

@@ -15,7 +15,7 @@ SAME_S = 1e-3  # times that differ by less are the same row's
 
 @dataclass(frozen=True)
 class Estimates:
-    """m answers of one engine; what it does not tell is None."""
+    """m answers of one engine; what it does not report is None."""
 
     name: str
     rows: np.ndarray  # (m,) rows of the observations, increasing

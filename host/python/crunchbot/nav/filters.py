@@ -130,7 +130,7 @@ class Filter:
         normals: bool = False,
     ):
         """`components`: (n,) of COMPONENT, to begin from in place of the scene's prior; `sensors`: more than the scene's;
-        `normals`: rows may tell directions of the surfaces that object whiskers touch."""
+        `normals`: rows may carry directions of the surfaces that object whiskers touch."""
         if name not in filter_names():
             raise SettingError(f"filter '{name}' is unknown; choose one of {', '.join(filter_names())}")
         if not 0 <= seed <= SEED_MOST:

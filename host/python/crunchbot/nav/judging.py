@@ -19,11 +19,11 @@ SURE = 0.9  # a confidence above it is a claim ...
 WRONG_M, WRONG_RAD = 0.25, 0.5  # ... which is wrong beyond these
 GRACE_ROWS = 30  # after a kidnap, in which nobody can know
 FOUND_ROWS = 10  # successive near rows: found
-CARRIED_ROWS, CARRIED_M = 10, 0.1  # carried: the truth moved so much more in so many rows than odometry tells
+CARRIED_ROWS, CARRIED_M = 10, 0.1  # carried: the truth moved so much more in so many rows than odometry reports
 
 
 def judge(estimates: Estimates, observations: Observations, near_m: float = NEAR_M) -> dict:
-    """Figures of estimates where the truth is known; None for what the engine does not tell.
+    """Figures of estimates where the truth is known; None for what the engine does not report.
 
     ValueError when the truth of no estimated row is known.
     """
@@ -113,14 +113,14 @@ def travel_of(observations: Observations, starts: list[int]) -> np.ndarray:
 
 
 def bits_wanted(scene: Scene, near_m: float = NEAR_M) -> float:
-    """Bits that tell a place of radius near_m from all others of the arena's area; the heading is not counted."""
+    """Bits that separate a place of radius near_m from all others of the arena's area; the heading is not counted."""
     x, y = scene.arena.size_m
     return math.log2(x * y / (math.pi * near_m**2))
 
 
 def bits_reported(scene: Scene, observations: Observations) -> np.ndarray | None:
     """(n,) bits that the floor can have given at most up to a row, since the last start: each tile that a texture whisker meets
-    for the first time tells log2(textures). The moment at which a border is crossed is not counted. None for a robot with
+    for the first time carries log2(textures). The moment at which a border is crossed is not counted. None for a robot with
     object whiskers, whose contacts no such bound holds for."""
     arena, tips = scene.arena, scene.robot.of_role("texture")
     if scene.robot.of_role("object") or not tips or observations.truth is None:

@@ -15,7 +15,7 @@ from .states import TICK_S
 REST_BLOCKS = 2  # that give the rest: creep of an earlier contact may be left in the samples
 BLOCKS_BEFORE = REST_BLOCKS + 4  # the filter begins so long before the onset: it finds the touch in the noise itself
 NOISE_COUNTS = 11.0  # of one sample (crunchbot.touch.contact)
-LEAST_TICKS = 200  # of a contact, before which the ringing of the touch tells more than the surface
+LEAST_TICKS = 200  # of a contact, before which the ringing of the touch is stronger than the surface's vibration
 SURE = 0.9  # probability that the tip is on a surface, from which its normal is reported
 MODEL_RAD = 0.05  # error of a normal beside what the filter states: it knows a calibrated whisker, not the whisker
 

@@ -7,8 +7,8 @@ The row of every 0.1 s is one of four kinds:
     release in it     odometry since the last row that carried any, and the distance of each whisker measured
     first after it    odometry since the release
 
-Where an object whisker's model is one of whole whisks, a row that carries motion also tells how the surface lies that is
-touched or was just let go, and where. Where it has a texture model, rows tell the texture of the face that its tip swept
+Where an object whisker's model is one of whole whisks, a row that carries motion also reports the direction of the surface that is
+touched or was just let go, and where. Where it has a texture model, rows carry the texture of the face that its tip swept
 along in the last 200 samples.
 """
 

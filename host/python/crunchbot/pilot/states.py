@@ -1,4 +1,4 @@
-"""The behaviour's vocabulary: its states, the numbers it keeps to, one body whisk, and what the base can do and tells."""
+"""The behaviour's vocabulary: its states, the numbers it keeps to, one body whisk, and what the base can do and reports."""
 
 import math
 from dataclasses import dataclass

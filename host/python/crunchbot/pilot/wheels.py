@@ -1,4 +1,4 @@
-"""What a base can do and what it tells beside odometry, whatever its make."""
+"""What a base can do and what it reports beside odometry, whatever its make."""
 
 from dataclasses import dataclass
 

@@ -168,7 +168,7 @@ class Recorder:
 
 
 def describe(reader: Reader) -> dict[str, str]:
-    """What a recording's metadata tells of ring and bridge when it begins; at its end more may be known."""
+    """What a recording's metadata holds about ring and bridge when it begins; at its end more may be known."""
     started = {"ring": reader.name, "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
     return started | _of_bridge(reader)
 

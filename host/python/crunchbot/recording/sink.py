@@ -19,7 +19,7 @@ class Syncer:
     """Brings a file to the disk, by a thread: at most one fdatasync at a time, however many are asked for meanwhile.
 
     The first one syncs the file's directory too: without it a power cut may take the name. `error`: what fdatasync
-    failed with. It ends the syncing, because the kernel tells of lost data once only.
+    failed with. It ends the syncing, because the kernel reports lost data only once.
     """
 
     def __init__(self, file: BinaryIO):

@@ -18,7 +18,7 @@ class Timeline:
 
     With the daemon's clock mapping a frame's time is when its tick began; without, frames follow the bridge's clock
     from the moment the first was seen, so that a simulation or a replay at another speed keeps its own seconds.
-    Setting the wall clock changes nothing, except that `wall_step_ns` tells.
+    Setting the wall clock changes nothing, except that `wall_step_ns` shows it.
     """
 
     def __init__(

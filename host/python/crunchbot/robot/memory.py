@@ -1,6 +1,6 @@
 """A navigator's memory beyond its own death: what it writes down, and what a new one may believe of it.
 
-The row that the new one begins with decides. From the same pilot the summed motion tells what the robot did meanwhile,
+The row that the new one begins with decides. From the same pilot the summed motion is what the robot did meanwhile,
 as for any rows that were missed. Another pilot counts from its own start: for the time that nobody counted, each component
 grows by what the robot could have done in it (`widen`). Of the rest of what a filter learns (odometry's gains, trust
 in whiskers) nothing is kept.

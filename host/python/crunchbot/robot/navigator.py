@@ -3,7 +3,7 @@
 When it falls behind it weighs the newest rows that a tenth of a second is enough for, and takes the motion of all
 before them (crunchbot.robot.network.rows.Follower); in lock-step it weighs every row. A navigator that begins in mid-run goes on
 from what the one before it wrote down (crunchbot.robot.memory); without that it knows nothing of the start any more:
-uniform prior. A pose that somebody tells (crunchbot.robot.network.initial_pose) takes the place of all that was believed.
+uniform prior. A pose that a user sets (crunchbot.robot.network.initial_pose) takes the place of all that was believed.
 """
 
 import json
@@ -33,7 +33,7 @@ from .network.rows import Follower, Step
 from .track import Track
 
 BELIEF_NS = 500_000_000  # 2 Hz of the bridge's clock
-BELIEF_SHARE = 0.1  # of the navigator's time, at most, goes into telling it
+BELIEF_SHARE = 0.1  # of the navigator's time, at most, goes into publishing it
 CATCH_UP_S = 0.1  # of the navigator's time for rows that came late together: no longer than until the next row
 LOOK_S = 0.5  # between two words of health while nothing comes
 SCENE_PRIOR, UNIFORM, CHECKPOINT, GIVEN = "scene", "uniform", "checkpoint", "given"

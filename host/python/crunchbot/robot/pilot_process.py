@@ -1,4 +1,4 @@
-"""The pilot as a process of its own, the netbook's: reads the ring, drives the base, tells the others what it perceives.
+"""The pilot as a process of its own, the netbook's: reads the ring, drives the base, publishes what it perceives.
 
 `fly_in_step` follows a simulation that waits for it, to the end of the ring. `LiveFlight` goes on whatever comes and
 goes: ring, whiskerd, base, navigator; each loss is reported in the pilot's health. The wheels stop when the ring gets another
@@ -71,7 +71,7 @@ def fly_in_step(flight: Flight, reader: Reader, publisher: Publisher | None) -> 
 
 
 class LiveWheels:
-    """The live base for a Flight: where it tells nothing, a row still comes, with no motion in it, and the wheels as lost.
+    """The live base for a Flight: where it reports nothing, a row still comes, with no motion in it, and the wheels as lost.
 
     `held`: no order is passed on.
     """

@@ -55,7 +55,7 @@ class ServerError(UserError):
 
 
 class Results:
-    """What clients see. Answers are plain dicts, lists and numbers; None until there is something to tell."""
+    """What clients see. Answers are plain dicts, lists and numbers; None until there is something to report."""
 
     def __init__(self, link: Link, may_write: bool):
         self._link, self._may_write = link, may_write
@@ -122,7 +122,7 @@ class Results:
         row cannot be: the same limits hold as for rows of a pilot.
         """
         if not self._may_write:
-            raise PermissionError("this server only tells; start it with --write, and no pilot beside it")
+            raise PermissionError("this server is read-only; start it with --write, and no pilot beside it")
         if not isinstance(row, dict):
             raise ValueError("row: not cells by name; give a dict")
         checked = {str(name): _number(name, value) for name, value in row.items()}
@@ -243,7 +243,7 @@ class Server:
             raise self._error
 
     def _listen(self, stop: threading.Event) -> None:
-        """A fault of this thread is one of the server, which would tell old results for ever without it."""
+        """A fault of this thread is one of the server, which would report old results for ever without it."""
         try:
             while not stop.is_set():
                 self._results.take(self._inbox.take(LOOK_S))

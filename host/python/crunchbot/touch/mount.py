@@ -1,4 +1,4 @@
-"""What a body whisk can tell of an object depends on how the whisker is mounted and on which way it was pressed.
+"""What a body whisk can measure of an object depends on how the whisker is mounted and on which way it was pressed.
 
 Equation 3 holds for a corner under the shaft. A tip on a face is dragged along it as the robot turns, and bends by more
 or less than the turn, so the line's answer is not its distance; but then the distance is known: the whisker's length.

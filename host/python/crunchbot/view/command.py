@@ -71,7 +71,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="also answer under this name, as behind a forwarded port; repeatable",
     )
-    text = "pages may tell where the robot is; on loopback they may anyway"
+    text = "pages may set where the robot is; on loopback they always may"
     parser.add_argument("--allow-pose", action="store_true", help=text)
     parser.add_argument("--open", action="store_true", help="open the page in a browser")
     parser.set_defaults(run=run)

@@ -31,7 +31,7 @@ class Hub:
         may_set_pose: bool = False,
     ):
         """`source`: where the robot's messages come from; `scene`: where it is and what it looks like, if known;
-        `ring_owner`: the user whose rings are read, too; `may_set_pose`: pages may tell where the robot is.
+        `ring_owner`: the user whose rings are read, too; `may_set_pose`: pages may set where the robot is.
         """
         self.names, self._ring_owner = names, ring_owner
         self.source = source or NoRobot()

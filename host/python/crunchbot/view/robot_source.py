@@ -57,7 +57,7 @@ class NoRobot:
 
 
 class InboxSource(NoRobot):
-    """Takes what an Inbox holds; `close` ends the link it belongs to, `set_pose` tells a pose over it."""
+    """Takes what an Inbox holds; `close` ends the link it belongs to, `set_pose` sends a pose over it."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class InboxSource(NoRobot):
 
 
 def join(robot: str, connect: list[str], config: Path | None = None) -> InboxSource:
-    """Listen to a robot's streams; nothing is published but poses that a page tells. `connect`: its processes' endpoints,
+    """Listen to a robot's streams; nothing is published but poses that a page sets. `connect`: its processes' endpoints,
     tcp/HOST:PORT or tls/HOST:PORT, which need not be there yet; none: those of this machine. `config`: a file of zenoh's
     own configuration. UserError: it cannot be."""
     try:

@@ -127,7 +127,7 @@ class Tap:
         return self.pyramid.end - 1 + np.cumsum(steps)
 
     def _measure_tick(self, frames: np.ndarray) -> None:
-        """The length of a tick as the frames tell it, if they tell anything sensible."""
+        """The length of a tick by the frames, if they hold a sensible one."""
         ticks = int(frames["tick"][-1]) - int(frames["tick"][0])
         cycles = int(frames["time_cycles"][-1]) - int(frames["time_cycles"][0])
         if ticks > 0 and LIMITS["tick_period_min"] <= cycles / ticks < 1 << 32:
@@ -155,7 +155,7 @@ class Tap:
         return "refused" if self._trouble and self._trouble.name not in ("RING_MISSING", "WRITER_DEAD") else "waiting"
 
     def status(self) -> dict:
-        """Everything the status topic tells of this ring, ready for JSON; docs/view.md explains the fields."""
+        """Everything the status topic holds about this ring, ready for JSON; docs/view.md explains the fields."""
         now, reader = self._clock(), self._reader
         return {
             "ring": self.name,

@@ -1,4 +1,4 @@
-"""What tests of commands share: running one in this process or its own, and a ring that tells of itself."""
+"""What tests of commands share: running one in this process or its own, and a ring whose writer reports itself."""
 
 import contextlib
 import sys

@@ -1,4 +1,4 @@
-"""Rows that tell how the surface lies that a whisker touches: read, judged, used by filters; and rows that do not."""
+"""Rows that carry the direction of the surface that a whisker touches: read, judged, used by filters; and rows that do not."""
 
 import math
 from dataclasses import replace
@@ -55,7 +55,7 @@ def test_directions_lie_as_the_faces_do(made):
 
 @pytest.mark.parametrize("name", ["grid", "particle", "multi", "adaptive", "foveal", "ekf", "ukf"])
 def test_filters_use_them(made, name):
-    """What a direction is worth is for tools/benches normals to tell."""
+    """What a direction is worth is measured by tools/benches normals."""
     with_them, without = (
         localise.run(name, made.scene, rows) for rows in (made.observations, replace(made.observations, normal=None))
     )

@@ -143,7 +143,7 @@ def test_a_line_that_is_silent_for_a_second_is_back(robot):
 
 
 def test_a_base_that_neither_reported_nor_heard_went_on_as_it_did(robot):
-    """Driving, and 2.8 s in which it hears no order to stop, and tells so in its first frame after."""
+    """Driving, and 2.8 s in which it hears no order to stop, and reports it in its first frame after."""
     it = robot("--event", "silent@1.5+2.8")
     far, began_s = 0.0, time.monotonic()
     while it.count("silences") == 0:

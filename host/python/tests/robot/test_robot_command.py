@@ -319,7 +319,7 @@ def stand_ins(monkeypatch):
     def stand_in(program: Program, meeting: parts.Meeting) -> Program:
         tells = program.name == parts.BRIDGE
         command = [sys.executable, "-c", TELLS_TRUTH, meeting.simulation] if tells else ["sleep", "1000"]
-        return Program.of(program.name, command, tells=program.tells)
+        return Program.of(program.name, command, reports=program.reports)
 
     def waiting(arguments, meeting):
         table[:] = [stand_in(program, meeting) for program in made(arguments, meeting)]
@@ -366,4 +366,4 @@ def test_with_the_documented_configuration_view_hears_the_supervisor(supervised,
 
 def expected(table: list[Program]) -> set[str]:
     """The topics of a supervisor of a simulated robot."""
-    return {"truth"} | {f"health/{program.name}" for program in table if not program.tells}
+    return {"truth"} | {f"health/{program.name}" for program in table if not program.reports}

@@ -1,4 +1,4 @@
-"""What a pilot tells of its odometry: where it is by its own sums, how fast it moved, and how sure that is."""
+"""What a pilot reports of its odometry: where it is by its own sums, how fast it moved, and how sure that is."""
 
 from types import SimpleNamespace
 

@@ -215,7 +215,7 @@ def test_novelty_needs_three_recordings_of_a_class():
 
 
 def test_recordings_of_one_load_are_left_out_together():
-    """What is left out tells how novel a load is that no training drive had."""
+    """What is left out shows how novel a load is that no training drive had."""
     rng = np.random.default_rng(7)
     labels, loads = np.tile(np.arange(3), 15), np.tile(np.repeat(np.arange(5), 3), 3)
     rows = [

@@ -1,4 +1,4 @@
-"""What whisker-view knows of the robot, and what it tells a page of it."""
+"""What whisker-view knows of the robot, and what it sends to a page about it."""
 
 import asyncio
 import json
@@ -296,7 +296,7 @@ def test_a_page_reports_a_pose_where_it_may(may, pose, said):
 
 
 def fuzz_robot(inputs: int, seed: int) -> int:
-    """So many mutated messages to a view; what it then tells is still JSON. Gives how many were refused."""
+    """So many mutated messages to a view; what it then sends is still JSON. Gives how many were refused."""
     rng = random.Random(seed)
     post = Post()
     hub = Hub([], post.source, SCENE)

@@ -156,7 +156,7 @@ class MadeUpRun:
         return m.Localisation(header, "adaptive", pose, confidence, row, 1, 0, missed, 0, "scene")
 
     def contact(self, row: int) -> list[tuple[str, m.Contact]]:
-        """What each object whisker has to tell: a touch that begins, is measured a row later, or is over."""
+        """The state of each object whisker: a touch that begins, is measured a row later, or is over."""
         return [("contact", reported) for ray in SCENE.robot.of_role("object") if (reported := self.touch(ray, row))]
 
     def touch(self, ray, row: int) -> m.Contact | None:

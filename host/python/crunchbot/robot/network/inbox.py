@@ -47,7 +47,7 @@ class Inbox:
     ):
         """sources: streams that are announced; None: everything is taken, as from a file.
 
-        judge: what is wrong with a message, and what helps, where its bytes alone do not tell; empty: it is taken.
+        judge: what is wrong with a message, and what helps, where its bytes alone do not show it; empty: it is taken.
         """
         self._prefix, self._condition, self._sources = prefix, threading.Condition(), sources
         self._waiting: deque = deque(maxlen=most)
@@ -207,5 +207,5 @@ def _kind(topic: str, encoding: str) -> type:
 
 
 def encoding_of(kind: type) -> str:
-    """What zenoh tells of a payload of this class."""
+    """What zenoh reports of a payload of this class."""
     return f"{CDR};{SCHEMAS[kind]}"

@@ -76,7 +76,7 @@ def to_row(message: Observation, motion: ArrayLike | None = None, t_ns: int | No
 
 
 def time_text(row: Row) -> str:
-    """A row's time as the files tell it."""
+    """A row's time as the files hold it."""
     return f"{row.t_s:.10g}"
 
 
@@ -136,7 +136,7 @@ class Follower:
     """Turns what came since the last look into steps, so that no motion is lost whatever was skipped or missed.
 
     A step for each of the newest rows, as many as there is time for (the paper: one), and one for each row before them
-    that tells a whisk's distance, for those are few and precious. A pilot that began anew tells motion from its own
+    that carries a whisk's distance, because those are few. A pilot that began anew reports motion from its own
     start only: what the robot moved in between is not known.
     """
 

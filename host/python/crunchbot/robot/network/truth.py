@@ -14,7 +14,7 @@ MESSAGE_BYTES = 256
 
 
 class TruthWatcher(threading.Thread):
-    """Publishes what the simulation tells until it ends or `stop` is set. The simulation does not wait for it."""
+    """Publishes what the simulation reports until it ends or `stop` is set. The simulation does not wait for it."""
 
     def __init__(self, path: Path, link: Link, stop: threading.Event):
         super().__init__(daemon=True)

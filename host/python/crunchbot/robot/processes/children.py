@@ -31,7 +31,7 @@ DEAD, STOPPED = "ZXx", "Tt"  # states of proc(5)
 class Program:
     """A line of a process table.
 
-    serves: it goes on until it is asked to end, and is missed when it ends before; tells: it tells of itself on a health
+    serves: it goes on until it is asked to end, and is missed when it ends before; reports: it reports itself on a health
     topic; moves: it can move wheels, and has a heartbeat; fed: it feeds a watchdog, and one that hangs is ended;
     steady_s: who ran for so long is started again at once; orphaned: the signal it has when who started it has ended.
     """
@@ -39,7 +39,7 @@ class Program:
     name: str
     command: tuple[str, ...]
     serves: bool = False
-    tells: bool = False
+    reports: bool = False
     moves: bool = False
     fed: bool = False
     steady_s: float = 10.0

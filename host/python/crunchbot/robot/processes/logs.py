@@ -27,7 +27,7 @@ def run_folder(logs: Path) -> Path:
 
 
 def last_line(log: Path) -> str:
-    """The process's own last line that tells no progress, without its time, of a log's last 4 KiB; empty: there is none.
+    """The process's own last line that is no progress, without its time, of a log's last 4 KiB; empty: there is none.
 
     Bytes that are no UTF-8 are replaced: a program may print names of files and devices as they are.
     """

@@ -159,7 +159,7 @@ def netbook(body: Body, meeting: Meeting, with_desktop: bool) -> list[Program]:
     pilot += [*meeting.options, *(["--await", "navigator"] if with_desktop else [])]
     return [
         Program.of("base", [*table.base(), "--wait"], moves=True, fed=True, steady_s=BASE_STEADY_S),
-        Program.of("pilot", pilot, tells=True, moves=True),
+        Program.of("pilot", pilot, reports=True, moves=True),
     ]
 
 
@@ -168,10 +168,10 @@ def desktop(body: Body, meeting: Meeting, bag: Path | None, view_port: int | Non
     commands = Table(body, meeting)
     navigator = [*commands.navigator(), "--stay", "--checkpoint", meeting.checkpoint]
     navigator += ["--listen", meeting.endpoint(2), "--connect", meeting.endpoint(1), *meeting.options]
-    table = [Program.of("navigator", navigator, tells=True)]
+    table = [Program.of("navigator", navigator, reports=True)]
     everybody = [word for number in range(3) for word in ("--connect", meeting.endpoint(number))] + meeting.options
     if bag:
-        table.append(Program.of("bag", [*commands.bag(bag), "--stay", "--next", *everybody], tells=True))
+        table.append(Program.of("bag", [*commands.bag(bag), "--stay", "--next", *everybody], reports=True))
     if view_port is not None:
         command = [*whisker("view"), *meeting.reading, "--robot", "--scene", body.scene, "--port", view_port]
         table.append(Program.of("view", [*command, *everybody]))

@@ -1,4 +1,4 @@
-"""Starts the robot's processes from one table, starts again what ends, and tells of each on its health topic.
+"""Starts the robot's processes from one table, restarts what ends, and reports each on its health topic.
 
 A program that ends is started again after a pause that doubles each time, up to PAUSE_MOST_S; one that ran steadily
 (`Program.steady_s`) is started again at once. One that cannot be started is tried again likewise. The end of the one
@@ -161,8 +161,8 @@ class Supervisor:
         return next(keeper.pid for keeper in self._keepers if keeper.program.name == name)
 
     def _reported(self) -> list[Keeper]:
-        """Those that this process tells of: the others do so themselves."""
-        return [k for k in self._keepers if not k.program.tells] if self._link else []
+        """Those that this process reports: the others report themselves."""
+        return [k for k in self._keepers if not k.program.reports] if self._link else []
 
     def _ended(self) -> str:
         """Why the program that all depend on is gone; empty: it is not. UserError: that is a failure."""

@@ -122,8 +122,8 @@ class Whisks:
     peak_counts: np.ndarray
     radius_mm: np.ndarray | None  # None when the file has no such column
     bad_rows: int  # rows with a cell that is no finite number: left out
-    node: int | None = None  # serial number of the node whose whisker it is, where the file tells
-    direction_deg: np.ndarray | None = None  # of the touch about the shaft, where the file tells
+    node: int | None = None  # serial number of the node whose whisker it is, where the file states it
+    direction_deg: np.ndarray | None = None  # of the touch about the shaft, where the file states it
 
     def part(self, use: ArrayLike) -> "Whisks":
         """Only the contacts of these indices."""

@@ -71,7 +71,7 @@ class WhiskModel:
         return shape_of(Contact(contact.t_s, contact.samples, rate, contact.reported_rad_s))
 
     def counts_per_rad(self, whisk_rad_s: float) -> float:
-        """Counts per radian by which the plug tilts; `whisk_rad_s`: of calibration, where its file did not tell."""
+        """Counts per radian by which the plug tilts; `whisk_rad_s`: of calibration, where its file did not state it."""
         turn = TERMS.index("turn")
         rate = whisk_rad_s if abs(self._c.mean[TERMS.index("rate")]) < LOG_RATE_NONE else 1.0
         return math.exp(self._c.log_gain - self._c.mean[turn]) / rate

@@ -16,11 +16,11 @@ from .shape import terms_of
 # Priors of the weights, mean and standard deviation. The whisker bends as far as it is pushed, so the angle's weight is
 # 1; unless the base turns otherwise than it is ordered, and the duration says little. Which of the two it is, the evidence
 # decides. Faster by 3:1 changes the bending by some percent (overshoot, creep); a report of the angle is worth something;
-# bow and return may tell of creep and rate, either way.
+# bow and return may follow creep and rate, either way.
 WEIGHT_MEAN = np.array([1.0, 0.0, 0.5, 0.0, 0.0])
 WEIGHT_SD = np.array([0.03, 0.05, 0.5, 0.5, 0.5])
 DOUBTED_MEAN, DOUBTED_SD = 0.5, 0.5  # of the angle's weight
-TRUST = 3.0  # ln of the odds, before anything is seen, that duration tells the angle
+TRUST = 3.0  # ln of the odds, before anything is seen, that the angle follows from the duration
 LOG_KAPPA_SD = 1.5  # about 1, whisker_physics section 6: plugs from 0.1 to clamped are conceivable
 # The cone's point over the outermost radius: 181.7 mm over 138 for this whisker; blunter and sharper ones are conceivable.
 CONE_OVER_HIGH, LOG_CONE_SD = 1.3, 0.15

@@ -64,7 +64,7 @@ def fit_change(
 ) -> Change | None:
     """Fits the detector to cleaned recordings (n, channels), their classes and folds; the limit from recordings left out in turn.
 
-    None when they are too short to tell a limit."""
+    None when they are too short for a limit."""
     if min(map(len, parts)) < length:
         return None
     features = [plain_features(blocks_of(part, length, len(floor)), False, floor) for part in parts]

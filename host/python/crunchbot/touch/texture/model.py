@@ -254,7 +254,7 @@ def read_training(path: str | Path, warn: Warn = ignore) -> tuple[dict[str, list
 
 
 def _a_letter_apart(one: str, other: str) -> bool:
-    """Whether a letter is left out, added or another, or two change places; numbers tell surfaces apart."""
+    """Whether a letter is left out, added or another, or two change places; numbers distinguish surfaces."""
     short, long = sorted((one.casefold(), other.casefold()), key=len)
     if short.translate(NO_DIGITS) == long.translate(NO_DIGITS):
         return False

@@ -1,4 +1,4 @@
-/* What topic status tells, as words and numbers: banner, tiles, health, lanes, kinds of bad records, events. */
+/* What topic status holds, as words and numbers: banner, tiles, health, lanes, kinds of bad records, events. */
 const STATES = { live: '● live', stalled: '▲ no frames', waiting: '○ no ring', ended: '■ ended', refused: '■ refused', gone: '■ not connected' };
 const EMPTY = ['absent', 'lane_off']; // no loss: there is no node, or the lane is off
 

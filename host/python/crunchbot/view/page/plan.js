@@ -15,7 +15,7 @@ class Plan {
   constructor(box) {
     this.box = box;
     [this.floor, this.live] = box.querySelectorAll('canvas');
-    this.scene = null; // as topic scene tells it
+    this.scene = null; // as topic scene holds it
     this.bounds = [0, 0, 1, 1];
     new ResizeObserver(() => { if (box.clientWidth && box.clientWidth !== this.wide) this.layOut(); }).observe(box);
   }

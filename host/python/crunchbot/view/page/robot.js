@@ -34,7 +34,7 @@ class RobotPart {
   }
 
   linked(up) {
-    if (up) return this.forget(); // it tells everything again
+    if (up) return this.forget(); // it sends everything again
     this.pill('gone', '■ not connected');
   }
 
@@ -76,7 +76,7 @@ class RobotPart {
     this.redraw();
   }
 
-  /* What topic status tells of the ring. */
+  /* What topic status holds about the ring. */
   takeRing(status) {
     if (this.player.on) return;
     this.ring = status;

@@ -26,7 +26,7 @@ function tellPose(word, belief) {
     ['Estimate', pose ? `x ${signed(pose.x, 2)} m, y ${signed(pose.y, 2)} m, ${degreesOf(pose.theta)}` : 'not known: no pose has come'],
     ['Spread (1 σ)', spread],
     ['Confidence', pose ? signed(pose.confidence, 2) : 'not known'],
-    ['Truth', truth ? `x ${signed(truth.x, 2)} m, y ${signed(truth.y, 2)} m, ${degreesOf(truth.theta)}` : 'not known: only simulation tells it'],
+    ['Truth', truth ? `x ${signed(truth.x, 2)} m, y ${signed(truth.y, 2)} m, ${degreesOf(truth.theta)}` : 'not known: only a simulation reports it'],
     ['Error', error],
     ['Belief', belief.said()],
     ['Filter', pose ? `${pose.filter}, from row ${count(pose.first_seq)}, prior ${pose.prior || 'not reported'}` : 'not known'],
