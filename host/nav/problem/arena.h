@@ -81,6 +81,7 @@ struct nav_robot {
     bool normals; /* rows carry directions of the surfaces that object whiskers touch */
     int sensors;
     const struct nav_sensor *sensor;
+    double odometry_turn; /* standard deviation of a row's turn, rad, as a gyroscope measures it; 0: the relative one */
 };
 
 /* Number of the tile under (x, y), of the nearest beyond a wall. */

@@ -12,6 +12,8 @@ struct nav_noise nav_motion_noise(const struct nav_robot *robot, const struct na
         .position = relative * distance * fmax(distance, settings->motion.along_m),
         .heading = relative * turn * fmax(turn, settings->motion.turn_rad) + drift * distance,
     };
+    if (robot->odometry_turn > 0.0) /* no error of the wheels is in it */
+        noise.heading = robot->odometry_turn * robot->odometry_turn;
     noise.position += motion->unknown_m * motion->unknown_m;
     noise.heading += motion->unknown_rad * motion->unknown_rad;
     return noise;

@@ -15,6 +15,19 @@ static void noise_does_not_depend_on_how_rows_cut_a_drive(void **state)
     assert_near(5.0 * fifth.heading, once.heading, 1e-12);
 }
 
+static void a_gyroscope_takes_the_place_of_the_wheels_for_turns(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    const struct nav_motion turn = {.step = {0.1, 0.0, 0.2}};
+    double position = nav_motion_noise(&p.robot, &p.settings, &turn).position;
+    p.robot.odometry_turn = 0.004;
+    assert_near(nav_motion_noise(&p.robot, &p.settings, &turn).position, position, 1e-15);
+    assert_near(nav_motion_noise(&p.robot, &p.settings, &turn).heading, 0.004 * 0.004, 1e-15);
+    const struct nav_motion stand = {.step = {0.0, 0.0, 0.0}};
+    assert_near(nav_motion_noise(&p.robot, &p.settings, &stand).heading, 0.004 * 0.004, 1e-15);
+}
+
 /* Drives and turns; the wheels report `reported` times the truth; the filter sees the truth within `spread`. */
 static struct nav_calibration drive(double reported, double reported_turn, double spread, double confidence, int rows)
 {
@@ -82,6 +95,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(noise_does_not_depend_on_how_rows_cut_a_drive),
+        cmocka_unit_test(a_gyroscope_takes_the_place_of_the_wheels_for_turns),
         cmocka_unit_test(a_constant_scale_and_turn_are_learned),
         cmocka_unit_test(an_unsure_filter_teaches_nothing),
         cmocka_unit_test(what_is_learned_is_bounded),

@@ -75,6 +75,7 @@ class Robot:
     radial_sigma_m: float
     whiskers: tuple[Whisker, ...]  # in the file's order: lane 0 first
     sensors: tuple[SensorTable, ...] = ()  # of the user's own
+    odometry_turn_sigma_rad: float | None = None  # of a row's turn, from a gyroscope; None: the relative one holds
 
     def of_role(self, role: str) -> list[Whisker]:
         return [whisker for whisker in self.whiskers if whisker.role == role]
@@ -200,6 +201,8 @@ def write(path: str | Path, scene: Scene) -> None:
     obstacles = [_corners(box) | ({"surface": surface[box]} if box in surface else {}) for box in arena.obstacles]
     _write(folder / ARENA, content | {"obstacle": obstacles, "unknown": list(map(_corners, arena.unknown))})
     content = {key: getattr(robot, key) for key in ("body_radius_m", "odometry_relative_sigma", "radial_sigma_m")}
+    turn = robot.odometry_turn_sigma_rad
+    content |= {} if turn is None else {"odometry_turn_sigma_rad": turn}
     sensors = [write_sensor(folder, sensor) for sensor in robot.sensors]
     _write(folder / ROBOT, content | {"whisker": list(map(_given, robot.whiskers)), "sensor": sensors})
     if prior is not None:
@@ -316,6 +319,8 @@ def _floor_image(table: Table, textures) -> tuple[str, ...]:
 def _robot(table: Table, size_m: tuple[float, float]) -> Robot:
     radius = table.number("body_radius_m", 0.0, LARGEST_M)
     odometry = table.number("odometry_relative_sigma", 0.0, 10.0)
+    gyroscope = "odometry_turn_sigma_rad"
+    turn = table.number(gyroscope, TINY, math.pi) if gyroscope in table.content else None
     radial = table.number("radial_sigma_m", TINY, LARGEST_M)
     whiskers = tuple(_whisker(entry) for entry in table.tables("whisker", WHISKERS_MOST))
     sensors = read_sensors(table, size_m)
@@ -324,7 +329,7 @@ def _robot(table: Table, size_m: tuple[float, float]) -> Robot:
     for number, name in enumerate(names):
         if name in names[:number]:
             raise table.fail("whisker", f"has the name '{name}' twice; rename one")
-    return Robot(radius, odometry, radial, whiskers, sensors)
+    return Robot(radius, odometry, radial, whiskers, sensors, turn)
 
 
 def _whisker(entry: Table) -> Whisker:

@@ -61,6 +61,18 @@ def test_what_is_written_reads_back_equal(folder, tmp_path):
     assert scenes.load(tmp_path / "uniform") == uniform
 
 
+def test_a_gyroscope_may_be_stated(folder, tmp_path):
+    text = ROBOT_TOML.replace("radial_sigma_m", "odometry_turn_sigma_rad = 0.0035\nradial_sigma_m", 1)
+    (folder / "robot.toml").write_text(text)
+    scene = scenes.load(folder)
+    assert scene.robot.odometry_turn_sigma_rad == 0.0035
+    scenes.write(tmp_path / "again", scene)
+    assert scenes.load(tmp_path / "again") == scene
+    (folder / "robot.toml").write_text(text.replace("0.0035", "0"))
+    with pytest.raises(scenes.SceneError, match="line 3: 'odometry_turn_sigma_rad' must be numbers"):
+        scenes.load(folder)
+
+
 def test_faces_may_have_textures(folder, tmp_path):
     text = ARENA_TOML.replace("max_m = [0.7, 1.0]", 'max_m = [0.7, 1.0]\nsurface = "ROUGH"')
     (folder / "arena.toml").write_text(text.replace("[[obstacle]]", 'wall = "SMOOTH"\n\n[[obstacle]]', 1))

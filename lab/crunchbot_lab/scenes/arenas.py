@@ -3,7 +3,9 @@
 Every maker takes (rng, body radius) and returns an Arena.
 """
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +18,10 @@ MORE_TEXTURES = (*TEXTURES, "CORK", "FELT", "GRIT")
 CONNECTED_LEAST = 0.98
 TRIES = 500
 
+FINE_M = 0.025  # tiles that stand for a floor of other shapes
+STEP_M = 0.01  # of the boxes that stand for a round wall
+
+Cell = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]  # x, y (m) -> numbers of the cell there
 Maker = Callable[[np.random.Generator, float], Arena]
 
 
@@ -121,3 +127,84 @@ def one_texture(rng: np.random.Generator, radius: float) -> Arena:
 def empty(rng: np.random.Generator, radius: float) -> Arena:
     """The paper's without blocks."""
     return tiled(blocks=0)(rng, radius)
+
+
+def with_tiles(make: Maker, edge: float) -> Maker:
+    """The same arenas with square tiles of another size."""
+
+    def made(rng: np.random.Generator, radius: float) -> Arena:
+        arena = make(rng, radius)
+        columns, rows = (math.ceil(side / edge - 1e-6) for side in arena.size_m)
+        return replace(arena, tile_m=edge, floor=random_floor(columns, rows, arena.textures, rng))
+
+    return made
+
+
+def with_cells(make: Maker, cell: Cell) -> Maker:
+    """The same arenas with a floor of cells that are no tiles, each of one texture. The arena has fine tiles in their place."""
+
+    def made(rng: np.random.Generator, radius: float) -> Arena:
+        arena = make(rng, radius)
+        columns, rows = (math.ceil(side / FINE_M - 1e-6) for side in arena.size_m)
+        x, y = np.meshgrid((np.arange(columns) + 0.5) * FINE_M, (np.arange(rows)[::-1] + 0.5) * FINE_M)
+        numbers = np.stack([part.astype(int) for part in cell(x, y)], axis=-1)
+        _, which = np.unique(numbers.reshape(-1, 2), axis=0, return_inverse=True)
+        letters = np.array([name[0] for name in arena.textures])[rng.integers(len(arena.textures), size=which.max() + 1)]
+        floor = tuple("".join(row) for row in letters[which].reshape(rows, columns))
+        return replace(arena, tile_m=FINE_M, floor=floor)
+
+    return made
+
+
+def turned(edge: float, turn: float) -> Cell:
+    """Square cells of this edge, turned by `turn` rad."""
+    c, s = math.cos(turn), math.sin(turn)
+    return lambda x, y: (np.floor((c * x + s * y) / edge), np.floor((c * y - s * x) / edge))
+
+
+def hexagons(side: float) -> Cell:
+    """Regular hexagons with sides of this length: axial coordinates, rounded to the nearest middle."""
+
+    def cell(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        q, r = (math.sqrt(3) * x - y) / (3 * side), 2 * y / (3 * side)
+        exact = np.stack([q, r, -q - r])
+        near = np.round(exact)
+        off = np.abs(near - exact)
+        for n, worst in enumerate(off.argmax(axis=0) == k for k in range(2)):
+            near[n] = np.where(worst, -near[1 - n] - near[2], near[n])
+        return near[0], near[1]
+
+    return cell
+
+
+def with_round_wall(make: Maker) -> Maker:
+    """The same floors within a round wall and without blocks: boxes as thin as STEP_M fill the corners."""
+
+    def made(rng: np.random.Generator, radius: float) -> Arena:
+        arena = make(rng, radius)
+        (width, height), reach = arena.size_m, min(arena.size_m) / 2 - STEP_M
+        boxes = []
+        for row in range(round(height / STEP_M)):
+            y0, y1 = row * STEP_M, (row + 1) * STEP_M
+            half = math.sqrt(max(reach**2 - ((y0 + y1) / 2 - height / 2) ** 2, 0.0))
+            boxes += [(0.0, y0, width / 2 - half, y1), (width / 2 + half, y0, width, y1)]
+        rounded = (tuple(float(round(v, 4)) for v in box) for box in boxes)
+        return replace(arena, obstacles=tuple(box for box in rounded if box[0] < box[2]))
+
+    return made
+
+
+def with_moved_box(arena: Arena, radius: float, at: np.ndarray, rng: np.random.Generator) -> Arena:
+    """One box stands elsewhere, clear of a robot at `at` (x, y); as it is where there is none, or no room."""
+    if not arena.obstacles:
+        return arena
+    which = int(rng.integers(len(arena.obstacles)))
+    x0, y0, x1, y1 = arena.obstacles[which]
+    for _ in range(TRIES):
+        x, y = (float(round(rng.uniform(0.0, side - long), 3)) for side, long in zip(arena.size_m, (x1 - x0, y1 - y0), strict=True))
+        box = (x, y, float(round(x + x1 - x0, 6)), float(round(y + y1 - y0, 6)))
+        boxes = tuple(box if n == which else old for n, old in enumerate(arena.obstacles))
+        moved = replace(arena, obstacles=boxes)
+        if moved.is_free(*at, radius + STEP_M) and connected_share(free_lattice(moved, radius)) >= CONNECTED_LEAST:
+            return moved
+    return arena

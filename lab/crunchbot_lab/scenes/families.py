@@ -21,6 +21,8 @@ KIDNAP_LEAST_M = 0.8
 KIDNAP_ROW, KIDNAP_ROWS = 300, 1200
 SLIPS, SLIP_ROWS = 4, 10
 NORMAL_SD_DEG = 5.0
+GYRO_DEG = 0.2
+TURNED_DEG, TURNED_M, HEXAGON_M = 30, 0.45, 0.28
 
 
 class FamilyError(UserError):
@@ -42,6 +44,7 @@ class Recipe:
     wrong_m: float = 0.0  # the prior's mean is off by so much
     wrong_rad: float = 0.0
     kidnap_row: int | None = None
+    moves: bool = False  # half-way a box is moved; the scene has it where it stands at the end
     slips: int = 0
     faults: tuple[Fault, ...] = ()
     map_fault: Callable[[Arena, np.random.Generator], Arena] | None = None
@@ -111,6 +114,20 @@ def _wrong(metres: float = 0.0, degrees: float = 0.0) -> Callable[[Recipe], Reci
     return lambda r: replace(r, wrong_m=metres, wrong_rad=math.radians(degrees))
 
 
+def _floor(change: Callable[[arenas.Maker], arenas.Maker]) -> Callable[[Recipe], Recipe]:
+    return lambda r: replace(r, arena=change(r.arena))
+
+
+def _gyroscope(r: Recipe) -> Recipe:
+    """Turns are measured, and the robot says how well."""
+    sigma = math.radians(GYRO_DEG)
+    return replace(
+        r,
+        world=replace(r.world, gyro_sd_rad=sigma),
+        robot=lambda: replace(r.robot(), odometry_turn_sigma_rad=sigma),
+    )
+
+
 MODIFIERS: dict[str, tuple[str, Callable[[Recipe], Recipe]]] = {
     "global": ("nothing is known of the start", lambda r: replace(r, uniform=True)),
     "kidnap": (
@@ -137,6 +154,20 @@ MODIFIERS: dict[str, tuple[str, Callable[[Recipe], Recipe]]] = {
         f"directions of the faces that object whiskers touch, to {NORMAL_SD_DEG:g} degrees",
         _world(normal_sd_rad=math.radians(NORMAL_SD_DEG)),
     ),
+    "gyro": (f"turns from a gyroscope, to {GYRO_DEG:g} degrees a row", _gyroscope),
+    **{f"pitch-{m:g}": (f"tiles of {m:g} m", _floor(lambda made, m=m: arenas.with_tiles(made, m))) for m in (0.3, 0.42)},
+    "turned-tiles": (
+        f"tiles of {TURNED_M:g} m, {TURNED_DEG} degrees against the walls",
+        _floor(lambda made: arenas.with_cells(made, arenas.turned(TURNED_M, math.radians(TURNED_DEG)))),
+    ),
+    "hexagons": (
+        f"a floor of hexagons, {HEXAGON_M:g} m a side",
+        _floor(lambda made: arenas.with_cells(made, arenas.hexagons(HEXAGON_M))),
+    ),
+    "round": ("a round wall, no obstacle", _floor(arenas.with_round_wall)),
+    "moving-box": ("a box is moved half-way", lambda r: replace(r, moves=True)),
+    "silent-minute": ("no whisker reads anything for a minute", _fault(faults.silent(faults.MINUTE_ROWS))),
+    "renamed": ("textures change their names half-way", _fault(faults.renamed)),
     "late": ("rows come late", _fault(faults.late)),
     "doubled": ("rows come twice", _fault(faults.doubled)),
     "reordered": ("rows change places", _fault(faults.reordered)),

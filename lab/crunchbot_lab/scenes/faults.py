@@ -13,7 +13,7 @@ Fault = Callable[[Observations, Scene, np.random.Generator], Observations]
 # What one cell of a broken frame holds: texture log-likelihood (inf: a bad cell, as a likelihood of zero reads too),
 # distance in m (-inf: a bad cell).
 BROKEN = {"zero": (np.inf, 0.0), "nan": (np.inf, np.nan), "inf": (np.inf, -np.inf), "constant": (0.0, 0.07)}
-SECOND_ROWS = 10
+SECOND_ROWS, MINUTE_ROWS = 10, 600
 
 
 def broken(kind: str, rows: int) -> Fault:
@@ -28,6 +28,28 @@ def broken(kind: str, rows: int) -> Fault:
         return out
 
     return fault
+
+
+def silent(rows: int) -> Fault:
+    """No whisker reads anything for so many rows, two fifths of the way through."""
+
+    def fault(o: Observations, scene: Scene, rng: np.random.Generator) -> Observations:
+        first = 2 * len(o) // 5
+        unread = (None if a is None else a.copy() for a in (o.texture, o.radial_m, o.normal))
+        texture, radial, normal = unread
+        for values in (texture, radial, normal):
+            if values is not None:
+                values[first : first + rows] = np.nan
+        return replace(o, texture=texture, radial_m=radial, normal=normal)
+
+    return fault
+
+
+def renamed(o: Observations, scene: Scene, rng: np.random.Generator) -> Observations:
+    """From half-way on each texture is reported under the next one's name."""
+    texture = o.texture.copy()
+    texture[len(o) // 2 :] = np.roll(texture[len(o) // 2 :], 1, axis=2)
+    return replace(o, texture=texture)
 
 
 def dead(o: Observations, scene: Scene, rng: np.random.Generator) -> Observations:

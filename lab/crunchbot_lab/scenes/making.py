@@ -6,13 +6,14 @@ be compared pair by pair.
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from crunchbot.nav.observations import Observations
 from crunchbot.scene import Arena, Prior, Robot, Scene
 
-from . import walk
+from . import arenas, walk
 from .explorer import TIP_M, Explored, explore
 from .families import KIDNAP_LEAST_M, SLIP_ROWS, Recipe, recipe
 from .files import rounded
@@ -34,6 +35,7 @@ STREAMS = (
     "map",
     "slip",
     "normal",
+    "move",
 )
 
 
@@ -59,12 +61,15 @@ def make_recipe(r: Recipe, seed: int, rows: int | None = None, path_seed: int | 
     robot = r.robot()
     arena = r.arena(rng["arena"], robot.body_radius_m)
     start = walk.draw_pose(arena, robot.body_radius_m, rng["start"])
-    first = rows if r.kidnap_row is None else min(rows, r.kidnap_row)
-    parts, kidnaps = [_drive(r, arena, robot, start, first, rng)], ()
-    if rows > first:
-        there = carried_to(arena, robot.body_radius_m, parts[0].truth[-1], rng["kidnap"])
-        parts.append(_drive(r, arena, robot, there, rows - first, rng))
-        kidnaps = (first,)
+    middle, at, parts, kidnaps = rows // 2 if r.moves else None, start, [], ()
+    cuts = {0, rows} | {row for row in (r.kidnap_row, middle) if row is not None and row < rows}
+    for first, until in pairwise(sorted(cuts)):
+        if first and first == r.kidnap_row:
+            at, kidnaps = carried_to(arena, robot.body_radius_m, at, rng["kidnap"]), (first,)
+        if first and first == middle:
+            arena = arenas.with_moved_box(arena, robot.body_radius_m, at[:2], rng["move"])
+        parts.append(_drive(r, arena, robot, at, until - first, rng))
+        at = parts[-1].truth[-1]
     taken = Observations(
         (np.arange(rows) + 1) * ROW_S,
         [],

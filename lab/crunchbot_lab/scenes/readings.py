@@ -24,6 +24,7 @@ class World:
     drift_rad: float = 0.0  # heading error of a straight metre
     scale: float = 1.0  # of reported distances
     turn_scale: float = 1.0  # of reported turns
+    gyro_sd_rad: float | None = None  # of a row's turn, measured by a gyroscope; None: the wheels tell it
     accuracy: float = 0.85  # of a texture window
     raw_nats: float | None = None  # None: calibrated windows, each alone. Else a naive Bayes's: so far apart, in runs
     wrong_rows: float = 3.0  # length of a run of wrong raw windows
@@ -45,6 +46,9 @@ def odometry(path: np.ndarray, world: World, rng: np.random.Generator) -> np.nda
         for scale, own in zip((world.scale, world.turn_scale), run, strict=True)
     )
     drift = world.drift_rad * np.sqrt(distance) * rng.standard_normal(len(true))
+    if world.gyro_sd_rad is not None:
+        measured_turn = true[:, 2] + world.gyro_sd_rad * rng.standard_normal(len(true))
+        return np.column_stack([true[:, :2] * gain[:, None], measured_turn])
     return np.column_stack([true[:, :2] * gain[:, None], true[:, 2] * turn + drift])
 
 

@@ -36,7 +36,10 @@ def test_a_written_scene_reads_back_bit_by_bit(family, tmp_path):
     assert not differing(observations, made.observations)
 
 
-@pytest.mark.parametrize("family", scenes.BASES)
+WORLDS = ("anchor+pitch-0.3", "anchor+turned-tiles", "anchor+hexagons", "anchor+round", "anchor+moving-box")
+
+
+@pytest.mark.parametrize("family", [*scenes.BASES, *WORLDS])
 def test_true_poses_stand_clear_and_seeds_differ(family):
     made, other = scenes.make(family, 8, rows=300), scenes.make(family, 9, rows=300)
     arena, radius = made.scene.arena, made.scene.robot.body_radius_m

@@ -347,6 +347,7 @@ def problem_of(
     problem.robot = {
         "body_radius": robot.body_radius_m,
         "odometry_relative": robot.odometry_relative_sigma,
+        "odometry_turn": robot.odometry_turn_sigma_rad or 0.0,
         "radial_sigma": robot.radial_sigma_m,
         "tips": len(tips),
         "tip": tips,
