@@ -149,7 +149,9 @@ def with_cells(make: Maker, cell: Cell) -> Maker:
         x, y = np.meshgrid((np.arange(columns) + 0.5) * FINE_M, (np.arange(rows)[::-1] + 0.5) * FINE_M)
         numbers = np.stack([part.astype(int) for part in cell(x, y)], axis=-1)
         _, which = np.unique(numbers.reshape(-1, 2), axis=0, return_inverse=True)
-        letters = np.array([name[0] for name in arena.textures])[rng.integers(len(arena.textures), size=which.max() + 1)]
+        letters = np.array([name[0] for name in arena.textures])[
+            rng.integers(len(arena.textures), size=which.max() + 1)
+        ]
         floor = tuple("".join(row) for row in letters[which].reshape(rows, columns))
         return replace(arena, tile_m=FINE_M, floor=floor)
 
@@ -201,7 +203,10 @@ def with_moved_box(arena: Arena, radius: float, at: np.ndarray, rng: np.random.G
     which = int(rng.integers(len(arena.obstacles)))
     x0, y0, x1, y1 = arena.obstacles[which]
     for _ in range(TRIES):
-        x, y = (float(round(rng.uniform(0.0, side - long), 3)) for side, long in zip(arena.size_m, (x1 - x0, y1 - y0), strict=True))
+        x, y = (
+            float(round(rng.uniform(0.0, side - long), 3))
+            for side, long in zip(arena.size_m, (x1 - x0, y1 - y0), strict=True)
+        )
         box = (x, y, float(round(x + x1 - x0, 6)), float(round(y + y1 - y0, 6)))
         boxes = tuple(box if n == which else old for n, old in enumerate(arena.obstacles))
         moved = replace(arena, obstacles=boxes)

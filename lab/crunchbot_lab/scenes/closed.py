@@ -130,7 +130,9 @@ class Loop:
     def __init__(self, family: str | Recipe, seed: int, policy: Policy, rows: int, filter: str = FAVOURITE):
         self.recipe = recipe(family) if isinstance(family, str) else family
         if self.recipe.faults or self.recipe.slips or self.recipe.map_fault or self.recipe.moves:
-            raise ValueError(f"family '{family}': faults, slips and moved boxes are of paths drawn beforehand; give one without")
+            raise ValueError(
+                f"family '{family}': faults, slips and moved boxes are of paths drawn beforehand; give one without"
+            )
         self.seed, self._policy, self._rows = seed, policy, rows
         rng = streams(seed)
         self.robot = self.recipe.robot()

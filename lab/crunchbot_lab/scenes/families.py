@@ -155,7 +155,9 @@ MODIFIERS: dict[str, tuple[str, Callable[[Recipe], Recipe]]] = {
         _world(normal_sd_rad=math.radians(NORMAL_SD_DEG)),
     ),
     "gyro": (f"turns from a gyroscope, to {GYRO_DEG:g} degrees a row", _gyroscope),
-    **{f"pitch-{m:g}": (f"tiles of {m:g} m", _floor(lambda made, m=m: arenas.with_tiles(made, m))) for m in (0.3, 0.42)},
+    **{
+        f"pitch-{m:g}": (f"tiles of {m:g} m", _floor(lambda made, m=m: arenas.with_tiles(made, m))) for m in (0.3, 0.42)
+    },
     "turned-tiles": (
         f"tiles of {TURNED_M:g} m, {TURNED_DEG} degrees against the walls",
         _floor(lambda made: arenas.with_cells(made, arenas.turned(TURNED_M, math.radians(TURNED_DEG)))),

@@ -9,8 +9,8 @@ import pytest
 from crunchbot.nav import mapping
 from crunchbot_lab.scenes import map_scoring
 from crunchbot_lab.scenes.arenas import scattered
-from crunchbot_lab.scenes.faults import MINUTE_ROWS
 from crunchbot_lab.scenes.families import recipe
+from crunchbot_lab.scenes.faults import MINUTE_ROWS
 from crunchbot_lab.scenes.making import make, make_recipe
 
 ROWS = 1500
