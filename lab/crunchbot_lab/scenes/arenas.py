@@ -197,7 +197,7 @@ def with_round_wall(make: Maker) -> Maker:
 
 
 def with_moved_box(arena: Arena, radius: float, at: np.ndarray, rng: np.random.Generator) -> Arena:
-    """One box stands elsewhere, clear of a robot at `at` (x, y); as it is where there is none, or no room."""
+    """One box stands in another place, clear of a robot at `at` (x, y); as it is where there is none, or no room."""
     if not arena.obstacles:
         return arena
     which = int(rng.integers(len(arena.obstacles)))
