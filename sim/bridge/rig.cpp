@@ -107,9 +107,8 @@ void Rig::count_frame()
 {
     waiting_ = frame_bytes_waiting();
     dropped_ = frames_dropped();
-    if (ticked_) {
-        waiting_ += WHISKER_FRAME_BYTES;
-    }
+    under_way_ = ticked_ ? WHISKER_FRAME_BYTES : 0;
+    waiting_ += under_way_;
     ticked_ = true;
 }
 
@@ -133,10 +132,24 @@ uint64_t Rig::frame_bytes_waiting() const
     return waiting_ - std::min(newly_dropped() * WHISKER_FRAME_BYTES, waiting_);
 }
 
+uint64_t Rig::bulk_packet() const
+{
+    return every_frame() ? WHISKER_FRAME_BYTES : WHISKER_LIMIT_BULK_PACKET;
+}
+
 bool Rig::bulk_packet_due() const
 {
-    const uint64_t packet = every_frame() ? WHISKER_FRAME_BYTES : WHISKER_LIMIT_BULK_PACKET;
-    return frame_bytes_waiting() >= packet || end_due_;
+    return frame_bytes_waiting() >= bulk_packet() || end_due_;
+}
+
+bool Rig::bulk_packet_forming() const
+{
+    return frame_bytes_waiting() < bulk_packet() + under_way_ && !end_due_;
+}
+
+bool Rig::bulk_packet_later() const
+{
+    return false;
 }
 
 void Rig::bulk_packet_taken(uint64_t bytes)
@@ -147,7 +160,7 @@ void Rig::bulk_packet_taken(uint64_t bytes)
 
 void Rig::forget_frames()
 {
-    waiting_ = 0;
+    waiting_ = under_way_ = 0;
     dropped_ = frames_dropped();
     ticked_ = false;
     end_due_ = false;

@@ -82,6 +82,9 @@ class Rig
     bool bulk_packet_due() const;
     void bulk_packet_taken(uint64_t bytes);
 
+    // A packet that is due had better be asked for later.
+    virtual bool bulk_packet_later() const;
+
     // A bus reset and SET_CONFIGURATION end the run and empty the FIFO: nothing waits any more.
     void forget_frames();
 
@@ -95,6 +98,9 @@ class Rig
     // most 16, and at least one, so that a tick's date does not hang on the cycles that were simulated before it.
     unsigned microframes(uint32_t period);
 
+    // A packet that is due has the latest tick's frame in it, of which the bridge makes the bytes in these cycles.
+    bool bulk_packet_forming() const;
+
     // Until the last frame is in the FIFO.
     virtual void finish_run(const std::function<bool()> &usb_step) = 0;
 
@@ -103,10 +109,12 @@ class Rig
   private:
     void count_frame();
     uint64_t newly_dropped() const;
+    uint64_t bulk_packet() const; // bytes of a full one
 
     NodeBus bus_;
     uint64_t bus_cycles_ = 0; // since the last start-of-frame packet
     uint64_t waiting_ = 0;    // bytes; of frames dropped since the last tick it does not know yet
+    uint64_t under_way_ = 0;  // of waiting_, those of the latest tick's frame
     uint32_t dropped_ = 0;    // of frames_dropped(), those that waiting_ is without
     bool ticked_ = false;     // a tick has begun since start
     bool end_due_ = false;    // the packet that ends the stream has not been taken

@@ -226,7 +226,13 @@ bool UrbScheduler::step_bulk()
     if (bulk_.empty() || away_) {
         return false;
     }
-    return halted_ || rig_.ticks_by_itself() || rig_.bulk_packet_due() ? receive_packet() : futile_poll();
+    if (halted_ || rig_.ticks_by_itself()) {
+        return receive_packet();
+    }
+    if (!rig_.bulk_packet_due()) {
+        return futile_poll();
+    }
+    return !rig_.bulk_packet_later() && receive_packet();
 }
 
 bool UrbScheduler::receive_packet()

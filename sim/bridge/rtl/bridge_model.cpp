@@ -3,6 +3,8 @@
 #include "Vclocked_bridge.h"
 #include "Vclocked_bridge___024root.h"
 
+void Vclocked_bridge___024root___eval_nba(Vclocked_bridge___024root *root); // no header of Verilator's has it
+
 namespace bridge_sim
 {
 
@@ -10,6 +12,17 @@ namespace
 {
 
 constexpr int RESET_CYCLES = 16;
+
+// Of the model's triggers.
+constexpr uint64_t RISING = 1, FALLING = 2;
+
+// What follows an edge of the clock. Verilated::eval() looks for the edge first, and then for another one that the
+// first could have caused; the model's clock is an input, and there is no other.
+void evaluate(Vclocked_bridge___024root &root, uint64_t edge)
+{
+    root.__VnbaTriggered[0] = edge;
+    Vclocked_bridge___024root___eval_nba(&root);
+}
 
 } // namespace
 
@@ -19,6 +32,7 @@ BridgeModel::BridgeModel(NodeBus &bus, NorFlash &flash)
     top_->tick_external = 1;
     top_->tick_strobe = 0;
     top_->miso = UINT32_MAX >> (32 - LANES);
+    top_->eval();
     reset();
 }
 
@@ -134,9 +148,9 @@ uint32_t BridgeModel::frames_dropped() const
     return REGISTER(dropped);
 }
 
-// One evaluation (clocked_bridge.v): the edge that ended the cycle before, then the outputs of this one. The model is
-// made to believe that it saw the clock low since its last edge; its falling edge clocks nothing but the flash. The
-// node wires answer in between: a record's bit is on MISO at the first edge after the SCK edge that shifted it out.
+// One evaluation (clocked_bridge.v): the edge that ended the cycle before, then the outputs of this one. The falling
+// edge clocks nothing but the flash. The node wires answer in between: a record's bit is on MISO at the first edge
+// after the SCK edge that shifted it out.
 void BridgeModel::cycle()
 {
     Vclocked_bridge &top = *top_;
@@ -145,12 +159,9 @@ void BridgeModel::cycle()
     top.utmi_rx_valid = in.rx_valid;
     top.utmi_tx_ready = in.tx_ready;
     top.utmi_line_state = in.line_state;
-    top.clk = 1;
-    top.rootp->__Vtrigprevexpr___TOP__clk__0 = 0;
-    top.eval();
+    evaluate(*top.rootp, RISING);
     if (!top.flash_cs_n) {
-        top.clk = 0;
-        top.eval();
+        evaluate(*top.rootp, FALLING);
     }
     out.tx_data = top.utmi_tx_data;
     out.tx_valid = top.utmi_tx_valid;

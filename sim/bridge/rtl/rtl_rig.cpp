@@ -104,7 +104,16 @@ bool RtlRig::begin_tick()
 
 void RtlRig::end_tick(const std::function<bool()> &usb_step)
 {
+    in_transfer_ = true;
     wait_while([this] { return bridge_.link_busy(); }, usb_step);
+    in_transfer_ = false;
+}
+
+// A packet takes as many cycles as a transfer does. Begun when its last byte is there, it would outlast this transfer
+// by half; begun with the next one, both are over at the same time.
+bool RtlRig::bulk_packet_later() const
+{
+    return in_transfer_ && bulk_packet_forming() && !every_frame();
 }
 
 void RtlRig::finish_run(const std::function<bool()> &usb_step)

@@ -23,6 +23,7 @@ class RtlRig : public Rig
     uint32_t frames_dropped() const override;
     bool every_frame() const override;
     bool at_rtl() const override;
+    bool bulk_packet_later() const override;
 
   protected:
     void power_up() override;
@@ -37,6 +38,8 @@ class RtlRig : public Rig
     UsbHost host_;
 
   private:
+    bool in_transfer_ = false;
+
     void wait_while(const std::function<bool()> &busy, const std::function<bool()> &usb_step);
 };
 

@@ -57,6 +57,20 @@ void hardware_settings(void **)
     run_all(settings);
 }
 
+// Two frames to a packet: a packet and a transfer share their cycles, so a pair of ticks takes little more than two
+// transfers. A packet takes a cycle per byte.
+void packets_and_transfers_share_the_cycles(void **)
+{
+    constexpr uint64_t TICKS = 200;
+    expect_success([] {
+        Bench bench(settings_for(TICKS, 6));
+        constexpr uint64_t BITS = WHISKER_RECORD_BYTES * 8, GAPS = WHISKER_RECORD_BYTES / 2 - 1;
+        constexpr uint64_t REST = 150; // SYNC, select, start-of-frame packets
+        constexpr uint64_t TRANSFER = BITS * WHISKER_LIMIT_SCK_DIVIDER_MIN + GAPS * WHISKER_LIMIT_WORD_GAP_MIN;
+        assert_in_range(bench.run().cycles / TICKS, TRANSFER, TRANSFER + REST);
+    });
+}
+
 // An odd number of frames ends with a short packet, an even one with an empty packet.
 void odd_number_of_frames(void **)
 {
@@ -129,6 +143,7 @@ int main()
         cmocka_unit_test(six_lanes_fastest_link),
         cmocka_unit_test(all_lanes_fastest_link),
         cmocka_unit_test(hardware_settings),
+        cmocka_unit_test(packets_and_transfers_share_the_cycles),
         cmocka_unit_test(odd_number_of_frames),
         cmocka_unit_test(faults_are_reported_exactly_and_change_nothing_else),
         cmocka_unit_test(second_enumeration_after_odd_packets),
