@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-rtl demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build setup setup-tests abi example-data docs manual gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-rtl demo-map demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build setup setup-tests abi example-data docs manual gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -16,6 +16,9 @@ demo: build ## the whole chain on simulated hardware, magnet to pose: about half
 
 demo-rtl: build ## the same with every clock cycle of the bridge simulated, not only those of the first seconds: about a minute
 	@$(PYTHON) -m crunchbot_lab.demo --out build/demo --build-dir $(BUILD) --seed $(SEED) --level rtl
+
+demo-map: build ## the whole robot maps an unknown arena for 300 s, then finds itself in its own map: about three minutes; SEED=n
+	@$(PYTHON) -m crunchbot_lab.demo.mapping --out build/demo-map --build-dir $(BUILD) --seed $(SEED)
 
 demo-long: build ## 30 simulated minutes of the whole robot, with a report; SEED=n; LEVEL=bytes, or signals (a minute), or rtl
 	@$(PYTHON) -m crunchbot_lab.demo.long --out build/demo-long --build-dir $(BUILD) --seed $(SEED) --level $(LEVEL)

@@ -89,7 +89,7 @@ class Machine:
         bridge = replace(bridge, command=(*bridge.command[:cut], *map(str, more), *bridge.command[cut:]))
         desktop = parts.desktop(body, self._desktop, self.bags / "robot.mcap", self.view_port)
         daemon = parts.daemon(body, self._netbook, simulated=True)
-        return [bridge, *desktop, daemon, *parts.netbook(body, self._netbook, with_desktop=True)]
+        return [bridge, *desktop, daemon, *parts.netbook(body, self._netbook, parts.NAVIGATOR)]
 
     @contextmanager
     def running(self):

@@ -32,6 +32,7 @@ COMMANDS = {
     "robot": "all processes of a robot, on hardware or simulated",
     "pilot": "the netbook's part of a robot: samples to wheel speeds and observations",
     "navigator": "pose and belief of a robot as its rows come, over the network",
+    "mapper": "map and pose of a robot in an unknown arena as its rows come, over the network",
     "ros2": "a running robot as a node of ROS 2 by rmw_zenoh, without ROS: standard messages, frames, /initialpose",
     "foxglove": "a running robot in Foxglove: pose, belief, whiskers, map, health; a pose set there is obeyed",
     "bag": "record everything a robot's processes say, for ROS 2 tools",
@@ -47,7 +48,7 @@ COMMANDS = {
 EXTRAS = {
     **dict.fromkeys(("record", "replay"), "record"),
     "view": "view",
-    **dict.fromkeys(("robot", "pilot", "navigator", "bag", "pyro", "top"), "robot"),
+    **dict.fromkeys(("robot", "pilot", "navigator", "mapper", "bag", "pyro", "top"), "robot"),
     **{name: name for name in ("export", "ros2", "foxglove")},
     **dict.fromkeys(("localise", "map", "calibrate", "scene"), "scenes"),
 }

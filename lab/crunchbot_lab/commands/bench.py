@@ -22,6 +22,7 @@ from crunchbot.tables import TableError, unwritable
 
 from ..scenes import benchmark, map_scoring, write_scene
 from ..scenes.making import make
+from ..scenes.map_reading import read_map_folder
 
 EXAMPLE = "whisker bench touch --scene anchor+global --filter adaptive"
 MAP_EXAMPLE = "whisker bench map --scene anchor --seed 7 --rows 600"
@@ -35,6 +36,21 @@ COLUMNS = (  # title, key of the figure, factor, format
     ("Brier", "brier", 1, ".3f"),
     ("rows to lock", "rows_to_lock", 1, ".0f"),
     ("us a row", "step_us_mean", 1, ".3g"),
+)
+
+
+MAP_COLUMNS = (
+    ("error mm", "error_median_m", 1000, ".1f"),
+    ("90 % mm", "error_p90_m", 1000, ".1f"),
+    ("from first pose mm", "anchored_median_m", 1000, ".1f"),
+    ("in 90 % region", "coverage_90", 100, ".0f"),
+    ("faces right %", "faces_right", 100, ".0f"),
+    ("corners found %", "corners_found", 100, ".0f"),
+    ("false %", "corners_false", 100, ".0f"),
+    ("tiles said %", "tiles_said", 100, ".0f"),
+    ("right %", "tiles_right", 100, ".1f"),
+    ("solid cells right %", "solid_right", 100, ".0f"),
+    ("free right %", "free_right", 100, ".0f"),
 )
 
 
@@ -151,6 +167,8 @@ def _add_map(actions: Any) -> None:
         "a family of scenes (see whisker scene make --list), or a scene folder with true poses (default: %(default)s)"
     )
     p.add_argument("--scene", default="anchor", metavar="NAME", help=text)
+    text = "judge what these folders hold, of any SLAM, in place of whisker map: est.csv, and map.yaml, faces.csv, arena.toml"
+    p.add_argument("maps", nargs="*", metavar="MAP", help=text)
     p.add_argument("--seed", type=whole_number(0), default=1, help="of a family's scene (default: %(default)s)")
     p.add_argument("--rows", type=whole_number(1), default=MAP_ROWS, help="of a family's scene (default: %(default)s)")
     text = (
@@ -173,10 +191,36 @@ def map_score(arguments: argparse.Namespace) -> int:
         return 0
     if rows.truth is None or not np.isfinite(rows.truth).all():
         raise BenchError(f"bench map: {arguments.scene} has rows without true poses; give a scene that has them all")
+    if arguments.maps:
+        found = {name: _map_of_others(name, scene, rows) for name in arguments.maps}
+        print(json.dumps(found) if arguments.json else map_table(found))
+        return 0
     found = _map_scores(arguments, scene, rows)
     lines = (f"{key}: {'-' if value is None else f'{value:.4g}'}" for key, value in found.items())
     print(json.dumps(found) if arguments.json else "\n".join(lines))
     return 0
+
+
+def _map_of_others(folder: str, scene: Scene, rows: Observations) -> dict[str, float | None]:
+    mapped, cells = read_map_folder(folder, scene, rows)
+    found = map_scoring.judged(mapped, scene.arena)
+    if not len(mapped.touched.faces):
+        found["corners_found"] = None
+    if cells is None:
+        return found | dict.fromkeys(("solid_right", "free_right"))
+    motion = map_scoring.best_motion(mapped.table["pose"][:, :2], rows.truth[:, :2])
+    return found | map_scoring.cells_score(cells, motion, scene.arena)
+
+
+def map_table(found: dict[str, dict[str, float | None]]) -> str:
+    """One line a folder, and one of the odometry alone; a dash for what a folder does not hold."""
+    width = max(len(name) for name in (*found, "odometry"))
+    wheels = {key: value for key, value in next(iter(found.values())).items() if key.startswith("odometry_")}
+    lines = [" | ".join([" " * width, *(title for title, *_ in MAP_COLUMNS)])]
+    for name, one in (found | {"odometry": {key.removeprefix("odometry_"): v for key, v in wheels.items()}}).items():
+        cells = (_cell(one.get(key), factor, form, len(title)) for title, key, factor, form in MAP_COLUMNS)
+        lines.append(" | ".join([f"{name:{width}}", *cells]))
+    return "\n".join(lines)
 
 
 def _map_scene(arguments: argparse.Namespace) -> tuple[Scene, Observations]:

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -167,12 +168,21 @@ def learn_models(out: Path, scene: scenes.Scene, options: argparse.Namespace) ->
 
 def run(out: Path, options: argparse.Namespace, level: str = "rtl") -> dict:
     """The chain at this level (chain.ChainRun); what was sent, received, spoilt and reported."""
-    ticks = round(options.seconds * TICKS_PER_S)
-    link = Link(options.sck_divider, options.word_gap, options.sample_point)
-    chain = ChainRun(
-        out, options.build_dir.resolve(), options.seed, options.seconds, options.lanes, link, options.create, level
-    )
-    with tqdm(total=ticks, desc=f"the whole robot, {level.upper()}", unit="tick") as bar:
+    results = simulate(chain_of(out, options, level))
+    links = (json.loads((out / f"{name}.json").read_text()) for name in ("pilot", "navigator"))
+    return results | scores.link_scores(*links)
+
+
+def chain_of(out: Path, options: argparse.Namespace, level: str, **more: Any) -> ChainRun:
+    """The chain of these options in this folder; `more`: other fields of ChainRun."""
+    link, build = Link(options.sck_divider, options.word_gap, options.sample_point), options.build_dir.resolve()
+    return ChainRun(out, build, options.seed, options.seconds, options.lanes, link, options.create, level, **more)
+
+
+def simulate(chain: ChainRun) -> dict:
+    """Runs it with its progress shown; what became of frames and faults."""
+    out, ticks = chain.out, round(chain.seconds * TICKS_PER_S)
+    with tqdm(total=ticks, desc=f"the whole robot, {chain.level.upper()}", unit="tick") as bar:
         wall_s = run_chain(chain, lambda tick: bar.update(tick - bar.n))
         bar.update(ticks - bar.n)
     speed = json.loads((out / "speed.json").read_text())
@@ -184,7 +194,6 @@ def run(out: Path, options: argparse.Namespace, level: str = "rtl") -> dict:
         "frames_lost": speed["ticks"] - log["frames_received"],
         "usb_faults_injected": speed["usb_faults_injected"],
         **scores.fault_scores(out / "faults.csv", out / "bad.csv"),
-        **scores.link_scores(*(json.loads((out / f"{name}.json").read_text()) for name in ("pilot", "navigator"))),
     }
 
 

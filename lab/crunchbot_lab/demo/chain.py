@@ -1,5 +1,6 @@
 """Runs the whole robot in lock-step, each part a process: simulated bridge with whiskerd inside and the base's serial
-line, whisker-log, whisker-base, pilot; over zenoh the navigator and the bag's recorder. One seed gives one result.
+line, whisker-log, whisker-base, pilot; over zenoh the navigator, or a mapper, and the bag's recorder. One seed gives one
+result.
 """
 
 import os
@@ -51,11 +52,19 @@ class ChainRun:
     create: int | None = 1  # the base: iRobot Create 1 or 2; None: wheels that obey at once, without a serial line
     level: str = "rtl"  # of the bridge; or bytes, or mixed: the same frames
     rtl_seconds: float = 5.0  # level mixed: so long from the start every clock cycle of the bridge is simulated
+    filters: tuple[str, ...] = FILTERS
+    known: Path | None = None  # scene folder that the navigator is given; None: that of the world
+    map_folder: Path | None = None  # a mapper in the navigator's place writes it
     before: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # by a program's name: words before its own
 
     @property
     def scene(self) -> Path:
         return self.out / "scene"
+
+    @property
+    def inference(self) -> str:
+        """The process that takes the rows."""
+        return parts.MAPPER if self.map_folder else parts.NAVIGATOR
 
     @property
     def logs(self) -> Path:
@@ -99,7 +108,7 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
         link = stack.enter_context(network.Link("truth", listen=[places.truth], lock_step=True))
         TruthWatcher(places.simulation, link, threading.Event()).start()
         base = [Program.of("base", [*table.base(), "--clock", "stream"], serves=True)] if run.create else []
-        others = [make(run, places, table) for make in (_pilot, _navigator, _bag)]
+        others = [make(run, places, table) for make in (_pilot, _mapper if run.map_folder else _navigator, _bag)]
         for program in [*base, _log(run, places), *others]:
             command = (*run.before.get(program.name, ()), *program.command)
             child = Child(replace(program, command=command), run.logs / f"{program.name}.log")
@@ -129,15 +138,21 @@ def _log(run: ChainRun, places: Places) -> Program:
 def _pilot(run: ChainRun, places: Places, table: parts.Table) -> Program:
     command = [*table.pilot(), "--simulation", places.simulation, *(["--base", places.base] if run.create else [])]
     command += ["--lock-step", "--listen", places.pilot, "--connect", "none"]
-    command += [word for name in ("navigator", "bag") for word in ("--await", name)]
+    command += [word for name in (run.inference, "bag") for word in ("--await", name)]
     command += ["--out", run.scene / "observations.csv", "--traces", run.out / "traces.csv"]
     return Program.of("pilot", [*command, "--report", run.out / "pilot.json"])
 
 
 def _navigator(run: ChainRun, places: Places, table: parts.Table) -> Program:
-    command = [*table.navigator(), "--lock-step", "--listen", places.navigator, "--connect", places.pilot]
-    command += [word for name in FILTERS for word in ("--filter", name)]
+    navigator = parts.Table(replace(table.body, scene=run.known or run.scene), places, table.find).navigator()
+    command = [*navigator, "--lock-step", "--listen", places.navigator, "--connect", places.pilot]
+    command += [word for name in run.filters for word in ("--filter", name)]
     return Program.of("navigator", [*command, "--out", run.out, "--report", run.out / "navigator.json"])
+
+
+def _mapper(run: ChainRun, places: Places, table: parts.Table) -> Program:
+    command = [*table.mapper(run.map_folder), "--lock-step", "--listen", places.navigator, "--connect", places.pilot]
+    return Program.of("mapper", [*command, "--report", run.out / "mapper.json"])
 
 
 def _bag(run: ChainRun, places: Places, table: parts.Table) -> Program:

@@ -11,7 +11,13 @@ from . import figures
 from .run import Run
 
 OWN = Path(__file__).resolve().parent / "web"
-LIVE_SCRIPTS = ("kit.js", "plan.js", "belief.js", "actors.js")  # of the live page, in the order they need each other
+LIVE_SCRIPTS = (
+    "kit.js",
+    "map.js",
+    "plan.js",
+    "belief.js",
+    "actors.js",
+)  # of the live page, in the order they need each other
 DARK = re.compile(r':root\[data-theme="dark"\] (\{.*?\n\})', re.DOTALL)
 # Colours of the figures, as drawn for paper -> as the page's style names them.
 THEMED = {

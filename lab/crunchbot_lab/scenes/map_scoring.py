@@ -22,6 +22,7 @@ CORNER_M = 0.05  # within which a corner is the right one
 MEET_M = 0.1  # from the ends of two faces to the corner that they make
 REACH_M = 0.3  # from the path: corners that a whisker could have felt
 SAMPLE_M = 0.05  # between the points of a face that are judged
+CELL_OFF_M = 0.05  # of the middle of a solid cell
 JUDGED = 200  # rows whose 90 % regions are judged, at most
 CHI2_90 = -2.0 * math.log(0.1)  # of two dimensions
 
@@ -57,10 +58,11 @@ def first_motion(poses: np.ndarray, truth: np.ndarray) -> Motion:
 
 def odometry_path(steps: np.ndarray) -> np.ndarray:
     """(n, 3) poses of odometry (n, 3) alone, from the origin; a step that is no number is none."""
-    path = np.zeros((len(steps) + 1, 3))
-    for k, step in enumerate(np.where(np.isfinite(steps), steps, 0.0)):
-        path[k + 1] = compose(path[k], step)
-    return path[1:]
+    x, y, turn = np.where(np.isfinite(steps), steps, 0.0).T
+    heading = np.cumsum(turn)
+    before = heading - turn
+    c, s = np.cos(before), np.sin(before)
+    return np.column_stack([np.cumsum(c * x - s * y), np.cumsum(s * x + c * y), heading])
 
 
 def trajectory(poses: np.ndarray, truth: np.ndarray) -> dict[str, float]:
@@ -74,8 +76,10 @@ def trajectory(poses: np.ndarray, truth: np.ndarray) -> dict[str, float]:
     }
 
 
-def coverage(poses: np.ndarray, covariance: np.ndarray, truth: np.ndarray) -> float:
-    """Share of 90 % regions, anchored, that hold the truth; covariance (n, 3, 3)."""
+def coverage(poses: np.ndarray, covariance: np.ndarray, truth: np.ndarray) -> float | None:
+    """Share of 90 % regions, anchored, that hold the truth; covariance (n, 3, 3). None: it is not known."""
+    if not np.isfinite(covariance[:, :2, :2]).all():
+        return None
     motion = first_motion(poses, truth)
     c, s = math.cos(motion.turn), math.sin(motion.turn)
     turn = np.array([[c, -s], [s, c]])
@@ -144,6 +148,24 @@ def corners_score(touched: TouchMap, motion: Motion, arena: Arena, path: np.ndar
     }
 
 
+def cells_score(cells: np.ndarray, motion: Motion, arena: Arena) -> dict[str, float | None]:
+    """Of the middles of cells (n, 3), x, y and whether solid: shares of the solid ones that are within CELL_OFF_M of something
+    solid, and of the free ones that are free."""
+    points, solid = motion.points(cells[:, :2]), cells[:, 2] > 0
+    width, height = arena.size_m
+    off = np.minimum(np.minimum(points[:, 0], width - points[:, 0]), np.minimum(points[:, 1], height - points[:, 1]))
+    for x0, y0, x1, y1 in arena.obstacles:  # negative: in something solid
+        out = np.maximum(
+            np.maximum(x0 - points[:, 0], points[:, 0] - x1), np.maximum(y0 - points[:, 1], points[:, 1] - y1)
+        )
+        off = np.minimum(off, out)
+    near, free = off[solid] <= CELL_OFF_M, off[~solid] > 0.0
+    return {
+        "solid_right": float(near.mean()) if len(near) else None,
+        "free_right": float(free.mean()) if len(free) else None,
+    }
+
+
 def tiles_score(mapped: Mapped, motion: Motion, arena: Arena) -> dict[str, float]:
     """Of the places where texture whiskers were: share whose tile the map has with a sure texture, and share of those that
     is the true one."""
@@ -173,7 +195,13 @@ def _tile_at(touched: TouchMap, point: np.ndarray) -> tuple[int, float]:
 
 
 def score(mapped: Mapped, arena: Arena) -> dict[str, float | None]:
-    """All figures of a mapped scene whose rows have true poses."""
+    """All figures of a run of the mapper over a scene whose rows have true poses."""
+    cost = {"step_us_mean": float(mapped.step_us.mean()), "step_us_p99": float(np.quantile(mapped.step_us, 0.99))}
+    return judged(mapped, arena) | cost
+
+
+def judged(mapped: Mapped, arena: Arena) -> dict[str, float | None]:
+    """The figures of poses and map, whoever made them."""
     poses, truth = mapped.table["pose"], mapped.rows.truth
     motion = best_motion(poses[:, :2], truth[:, :2])
     beside = trajectory(odometry_path(mapped.rows.odometry), truth)
@@ -184,6 +212,4 @@ def score(mapped: Mapped, arena: Arena) -> dict[str, float | None]:
         **faces_score(mapped.touched, motion, arena),
         **corners_score(mapped.touched, motion, arena, truth),
         **tiles_score(mapped, motion, arena),
-        "step_us_mean": float(mapped.step_us.mean()),
-        "step_us_p99": float(np.quantile(mapped.step_us, 0.99)),
     }

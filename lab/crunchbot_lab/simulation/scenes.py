@@ -55,7 +55,7 @@ def make_scene(seed: int, mechanics: str = MECHANICS[0]) -> tuple[Scene, tuple[f
     """The seed's scene, its prior included, and the true start pose (x, y, theta)."""
     random = np.random.default_rng([seed, 1])
     arena = _make_arena(random)
-    start = _draw_start(arena, random)
+    start = draw_start(arena, random)
     direction = random.uniform(-math.pi, math.pi)
     turn = PRIOR_OFF_RAD if random.random() < 0.5 else -PRIOR_OFF_RAD
     mean = (
@@ -82,7 +82,8 @@ def _tile_box(column: int, row: int) -> tuple[float, float, float, float]:
     return (TILE_M * column, TILE_M * row, TILE_M * (column + 1), TILE_M * (row + 1))
 
 
-def _draw_start(arena: Arena, random: np.random.Generator) -> tuple[float, float, float]:
+def draw_start(arena: Arena, random: np.random.Generator) -> tuple[float, float, float]:
+    """A pose somewhere, START_CLEARANCE_M clear of everything."""
     while True:
         x, y = random.uniform(START_CLEARANCE_M, ARENA_M - START_CLEARANCE_M, size=2)
         if arena.is_free(x, y, START_CLEARANCE_M):

@@ -8,7 +8,8 @@ import pytest
 
 from crunchbot import cli
 from crunchbot.nav.mapper import FACE, TouchMap
-from crunchbot_lab.scenes import map_scoring, write_scene
+from crunchbot.tables import TableError
+from crunchbot_lab.scenes import map_reading, map_scoring, write_scene
 from crunchbot_lab.scenes.making import make
 
 TURN, SHIFT = 0.7, np.array([0.3, -1.1])
@@ -88,3 +89,57 @@ def test_the_command_scores_the_mapper_and_the_poses_of_others(scene, tmp_path, 
     assert json.loads(capsys.readouterr().out)["error_median_m"] == pytest.approx(0.0, abs=1e-9)
     assert cli.main(["bench", "map", "--scene", "no-such-family"]) != 0
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.fixture(scope="module")
+def mapped_folder(scene, tmp_path_factory):
+    """A scene folder, and what `whisker map` writes of it."""
+    where = tmp_path_factory.mktemp("maps")
+    write_scene(where / "scene", scene.scene, scene.observations)
+    assert cli.main(["map", str(where / "scene"), "--out", str(where / "map"), "--json"]) == 0
+    return where
+
+
+def test_a_folder_of_any_slam_is_judged_as_the_mapper_itself(mapped_folder, capsys):
+    where = mapped_folder
+    (where / "poses").mkdir()
+    (where / "poses/est.csv").write_text((where / "map/est.csv").read_text())
+    capsys.readouterr()
+    names = [str(where / name) for name in ("map", "poses")]
+    assert cli.main(["bench", "map", *names, "--scene", str(where / "scene"), "--json"]) == 0
+    whole, poses = json.loads(capsys.readouterr().out).values()
+    assert cli.main(["bench", "map", "--scene", str(where / "scene"), "--json"]) == 0
+    mapper = json.loads(capsys.readouterr().out)
+    for key in ("error_median_m", "anchored_median_m", "coverage_90", "odometry_error_median_m", "tiles_right"):
+        assert whole[key] == pytest.approx(mapper[key], abs=2e-5), key
+    assert whole["faces_right"] == pytest.approx(mapper["faces_right"], abs=0.02)
+    assert whole["free_right"] > 0.95 and whole["solid_right"] > 0.8
+    assert poses["error_median_m"] == whole["error_median_m"] and poses["faces_right"] is None
+    assert poses["corners_found"] is None and poses["free_right"] is None
+    assert cli.main(["bench", "map", names[0], "--scene", str(where / "scene")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("odometry")
+
+
+def test_an_occupancy_that_is_off_is_wrong(scene, mapped_folder):
+    arena, truth = scene.scene.arena, scene.observations.truth
+    mapped, cells = map_reading.read_map_folder(mapped_folder / "map", scene.scene, scene.observations)
+    motion = map_scoring.best_motion(mapped.table["pose"][:, :2], truth[:, :2])
+    right = map_scoring.cells_score(cells, motion, arena)
+    off = map_scoring.Motion(motion.turn, motion.x + 0.3, motion.y)
+    wrong = map_scoring.cells_score(cells, off, arena)
+    assert wrong["solid_right"] < right["solid_right"] - 0.1 and wrong["free_right"] < right["free_right"]
+    swapped = np.column_stack([cells[:, :2], 1.0 - cells[:, 2]])
+    assert map_scoring.cells_score(swapped, motion, arena)["free_right"] < 0.3
+
+
+def test_rows_without_a_pose_are_carried_on_by_odometry(scene, mapped_folder, tmp_path):
+    lines = (mapped_folder / "map/est.csv").read_text().splitlines()
+    (tmp_path / "est.csv").write_text("\n".join(lines[:2] + lines[11::10]) + "\n")
+    mapped, cells = map_reading.read_map_folder(tmp_path, scene.scene, scene.observations)
+    whole, _ = map_reading.read_map_folder(mapped_folder / "map", scene.scene, scene.observations)
+    assert cells is None and not len(mapped.touched.faces)
+    assert np.abs(mapped.table["pose"][:, :2] - whole.table["pose"][:, :2]).max() < 0.1
+    assert np.array_equal(mapped.table["pose"][10::10], whole.table["pose"][10::10])
+    (tmp_path / "est.csv").write_text("\n".join(lines[:1] + lines[11::10]) + "\n")
+    with pytest.raises(TableError, match="no pose of the first row"):
+        map_reading.read_map_folder(tmp_path, scene.scene, scene.observations)

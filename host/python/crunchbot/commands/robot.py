@@ -14,7 +14,7 @@ from ..robot.models import load_models
 from ..robot.network.link import read_config
 from ..robot.network.options import link_that_warns
 from ..robot.network.truth import TruthWatcher
-from ..robot.policy import POLICIES, RANDOM
+from ..robot.policy import PLAN, POLICIES, RANDOM
 from ..robot.processes import holders, parts
 from ..robot.processes.logs import run_folder
 from ..robot.processes.supervisor import Supervisor
@@ -35,6 +35,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ring", default=RING, metavar="NAME", help="whiskerd's ring (default: %(default)s)")
     text = "use the whiskerd that runs, systemd's for instance, by its --ring"
     parser.add_argument("--no-daemon", action="store_true", help=text)
+    text = "as --desktop, with a mapper in the navigator's place: of the scene only robot.toml is used, and the map is kept"
+    parser.add_argument("--map", action="store_true", help=text)
     parser.add_argument("--desktop", action="store_true", help="also the desktop's side: navigator, bag, view")
     parser.add_argument(
         "--view-port", type=whole_number(0, 65535), default=VIEW_PORT, metavar="N", help="(%(default)s)"
@@ -66,6 +68,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    arguments.desktop |= arguments.map
+    if arguments.map and arguments.choose == PLAN:
+        raise UserError(f"robot: --map with --choose {arguments.choose}: it needs a known arena; choose another")
     if arguments.units:
         return _write_units(arguments)
     stop = stop_on_signals()
@@ -94,9 +99,10 @@ def _write_units(arguments) -> int:
     meeting = Installed(arguments.ring, arguments.units, *address, port=arguments.port)
     scene, models = arguments.scene.resolve(), arguments.models.resolve()
     body = parts.Body(scene, models, arguments.create, arguments.port, arguments.seed, arguments.choose)
-    table = [program for program in parts.netbook(body, meeting, arguments.desktop) if program.name != "base"]
+    table = [program for program in parts.netbook(body, meeting, _awaited(arguments)) if program.name != "base"]
     if arguments.desktop:
-        table += parts.desktop(body, meeting, meeting.bag, None if arguments.no_view else arguments.view_port)
+        view = None if arguments.no_view else arguments.view_port
+        table += parts.desktop(body, meeting, meeting.bag, view, meeting.map_folder if arguments.map else None)
     made = units(table, meeting)
     try:
         arguments.units.mkdir(parents=True, exist_ok=True)
@@ -142,10 +148,16 @@ def _table(arguments, meeting: parts.Meeting) -> list:
         table = []
     if arguments.desktop:
         view = None if arguments.no_view else arguments.view_port
-        table += parts.desktop(body, meeting, arguments.out / "robot.mcap", view)
+        map_folder = arguments.out / "map" if arguments.map else None
+        table += parts.desktop(body, meeting, arguments.out / "robot.mcap", view, map_folder)
     if not arguments.no_daemon:
         table.append(parts.daemon(body, meeting, arguments.simulated))
-    return table + parts.netbook(body, meeting, arguments.desktop)
+    return table + parts.netbook(body, meeting, _awaited(arguments))
+
+
+def _awaited(arguments) -> str | None:
+    """The process that the pilot waits for."""
+    return (parts.MAPPER if arguments.map else parts.NAVIGATOR) if arguments.desktop else None
 
 
 def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Simulated]:

@@ -1,5 +1,6 @@
 """A map from the rows of a scene folder, without the arena that the folder may hold; and the folder that is written."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -48,14 +49,20 @@ def read(folder: str | Path) -> tuple[Robot, tuple[str, ...], Observations]:
     return robot, textures, read_observations(folder / OBSERVATIONS, scene)
 
 
+def textures_in(names: Iterable[str], robot: Robot) -> tuple[str, ...]:
+    """The textures that the columns of the first texture whisker name; none where there is no such column."""
+    before = next((f"{whisker.name}_" for whisker in robot.of_role("texture")), None)
+    return tuple(name.removeprefix(before) for name in names if before and name.startswith(before))
+
+
 def _textures(path: Path, robot: Robot) -> tuple[str, ...]:
-    tips = [whisker.name for whisker in robot.of_role("texture")]
+    tips = robot.of_role("texture")
     if not tips:
         return ("NONE",)
-    header, _ = read_rows(path)
-    names = tuple(name.removeprefix(f"{tips[0]}_") for name in header if name.startswith(f"{tips[0]}_"))
+    names = textures_in(read_rows(path)[0], robot)
     if not names:
-        raise TableError(path, 1, f"no column of the texture whisker '{tips[0]}'; name one {tips[0]}_TEXTURE a texture")
+        tip = tips[0].name
+        raise TableError(path, 1, f"no column of the texture whisker '{tip}'; name one {tip}_TEXTURE a texture")
     return names
 
 

@@ -1,7 +1,8 @@
 """observations.csv of a scene folder as arrays. Strict in structure, forgiving in values (docs/formats.md)."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,18 @@ class Observations:
         """(n,) whether a row is later than all before it."""
         latest = np.fmax.accumulate(np.concatenate([[-np.inf], self.t_s]))[:-1]
         return self.t_s > latest
+
+
+def joined(parts: Sequence[Observations]) -> Observations:
+    """The rows of all parts, one at least, in order; every part has the same columns."""
+
+    def column(name: str) -> np.ndarray | None:
+        values = [getattr(part, name) for part in parts]
+        return None if values[0] is None else np.concatenate(values)
+
+    text = [t for part in parts for t in part.t_text]
+    names = (field.name for field in fields(Observations) if field.name != "t_text")
+    return Observations(t_text=text, **{name: column(name) for name in names})
 
 
 def observations_path(folder: str | Path) -> Path:

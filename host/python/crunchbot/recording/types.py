@@ -14,6 +14,7 @@ DTYPES = {
     "bool": "u1",
     "byte": "u1",
     "uint8": "u1",
+    "int8": "i1",
     "int32": "<i4",
     "uint32": "<u4",
     "int64": "<i8",

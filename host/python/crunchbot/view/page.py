@@ -8,6 +8,7 @@ FOLDER = Path(__file__).resolve().parent / "page"
 SCRIPTS = (  # in the order they need each other
     *("kit.js", "wire.js", "history.js", "traces.js", "panels.js"),
     *(
+        "map.js",
         "plan.js",
         "belief.js",
         "actors.js",

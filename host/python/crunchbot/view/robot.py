@@ -15,7 +15,10 @@ import numpy as np
 
 from ..observation import NOT_READ, VALUE, Column, Quantity, parse
 from ..robot.network.messages import CORNER, FACE, HEALTH, SHAFT, TIP, End
+from ..robot.network.ros import Pose
+from ..robot.network.rows import between, compose
 from ..scene import LARGEST_M, Scene
+from .maps import map_parts
 from .surfaces import Surfaces
 
 PATH_MOST = 3000  # points kept: 5 minutes at 10 Hz
@@ -29,6 +32,7 @@ COUNTER_TEXT_MOST = 40  # of a counter's name, and of its value
 SILENT_S = 3.0  # a process speaks once a second
 BACK_S = 2.0  # a clock that goes back so far has begun anew
 EXPECTED = ("pilot", "navigator")  # shown as not heard, until they are
+MAPPER, SAME_NS = "mapper", 1_000_000  # the filter's name in its answers; two stamps of one row
 KINDS = ("exploring", "body whisk", "after a whisk")
 PARTS = {TIP: "tip", SHAFT: "shaft"}
 SHAPES = {FACE: "face", CORNER: "corner"}
@@ -114,6 +118,9 @@ class RobotModel:
         """All but health and scene: a run has begun."""
         self.now_s: float | None = None
         self.pose = self.truth = self.behaviour = self.row = self.belief = None
+        self.grid = self.touched = None  # of a mapper
+        self._anchor: tuple | None = None  # a true pose, and the mapper's at that time
+        self._true: tuple[int, tuple] | None = None  # the newest truth: stamp, pose
         self.path, self.true_path = Path(), Path()
         self.contacts: dict[tuple[str, int], dict] = {}
         self.surfaces = Surfaces()
@@ -166,6 +173,7 @@ class RobotModel:
         if reported.filter != self._filter:
             return
         self.rows["missed"] = reported.rows_missed
+        self._note_mapper(reported)
         self.pose = placed(reported.pose.pose)
         if self.pose is None:
             return
@@ -183,7 +191,21 @@ class RobotModel:
         }
         self.surfaces.place(reported.observation_seq, self.pose)
 
+    def _note_mapper(self, reported) -> None:
+        """A mapper's frame is its own: the truth is shown in it, by the first row of which both are known."""
+        if reported.filter != MAPPER or self._anchor or self._true is None:
+            return
+        stamp_ns, true = self._true
+        if abs(stamp_ns - reported.header.stamp.ns) <= SAME_NS:
+            self._anchor, self.true_path = (true, reported.pose.pose.xytheta), Path()
+
     def _take_truth(self, reported) -> None:
+        true = reported.pose.xytheta
+        self._true = (reported.header.stamp.ns, true)
+        if self._anchor:
+            reported.pose = Pose.planar(*compose(self._anchor[1], between(self._anchor[0], true)))
+        elif self._filter == MAPPER:
+            return
         self.truth = placed(reported.pose)
         if self.truth is not None:
             self.true_path.add(reported.header.stamp.ns / 1e9, *self.truth.values())
@@ -191,6 +213,12 @@ class RobotModel:
     def _take_belief(self, reported) -> None:
         if reported.filter == (self._filter or reported.filter):
             self.belief = reported
+
+    def _take_map(self, reported) -> None:
+        self.grid = reported
+
+    def _take_touch_map(self, reported) -> None:
+        self.touched = reported
 
     def _take_behaviour(self, reported) -> None:
         since = reported.since.ns / 1e9
@@ -254,6 +282,10 @@ class RobotModel:
     def touching(self) -> list[dict]:
         """Contacts that have no end yet."""
         return [contact for contact in self.contacts.values() if contact["release_s"] is None]
+
+    def map(self) -> dict | None:
+        """The newest map for JSON; None: no mapper has sent one."""
+        return None if self.touched is None else map_parts(self.touched, self.grid)
 
     def belief_columns(self) -> np.ndarray:
         """(n, 6) float32 of the newest belief: x, y, theta, weight, sigma_m, sigma_rad."""

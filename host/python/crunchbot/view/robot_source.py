@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import UserError
 
-WANTED = ("observation", "contact", "behaviour", "localisation", "belief", "truth", "health/*")
+WANTED = ("observation", "contact", "behaviour", "localisation", "belief", "map", "touch_map", "truth", "health/*")
 SPEED_LEAST, SPEED_MOST = 0.1, 100.0  # of a recording
 TOLD_MOST = 200  # characters of what is wrong with a message
 

@@ -1,4 +1,4 @@
-"""The topics of the robot's part of the page: scene, robot, belief. Reference: docs/view.md."""
+"""The topics of the robot's part of the page: scene, robot, belief, map. Reference: docs/view.md."""
 
 import json
 import struct
@@ -9,7 +9,7 @@ from .hub import Hub
 from .robot import RobotModel
 
 ROBOT_S = 0.1  # between two messages of topic robot
-BELIEF_S = 0.25
+BELIEF_S, MAP_S = 0.25, 0.5
 POINTS_MOST = 500  # of a path in one message: a history comes in several
 BELIEF_HEAD = struct.Struct("<BBHIdd")  # topic, zero, poses, poses in the whole belief, stamp s, share of those sent
 BELIEF_ID = 6
@@ -125,6 +125,23 @@ class BeliefFeed:
         poses = self._model.belief_columns()
         head = BELIEF_HEAD.pack(BELIEF_ID, 0, len(poses), belief.components, belief.header.stamp.ns / 1e9, belief.mass)
         return head + poses.tobytes()
+
+    def close(self) -> None:
+        return
+
+
+class MapFeed:
+    """The newest map of a mapper, as JSON; null when a run without one has begun."""
+
+    def __init__(self, hub: Hub, options: dict):
+        self._model, self._reported, self._due = hub.robot, None, 0.0
+
+    def take(self) -> str | None:
+        newest, now = (self._model.touched, self._model.grid), time.monotonic()
+        if newest == (self._reported or (None, None)) or now < self._due:
+            return None
+        self._reported, self._due = newest, now + MAP_S
+        return json.dumps({"topic": "map", "map": self._model.map()}, separators=(",", ":"), allow_nan=False)
 
     def close(self) -> None:
         return

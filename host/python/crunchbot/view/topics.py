@@ -16,7 +16,7 @@ from whisker_protocol import LANES
 
 from .hub import Hub, RequestError
 from .pyramid import BINS, WIDTHS, spans
-from .robot_topics import BELIEF_ID, BeliefFeed, RobotFeed, SceneFeed
+from .robot_topics import BELIEF_ID, BeliefFeed, MapFeed, RobotFeed, SceneFeed
 
 BLOCK = struct.Struct("<BBHHBBIIQ")  # topic, flags, width, bins, lanes, zero, lane mask, subscription, first bin
 BLOCK_FRESH = 1  # flag: forget what came before this block
@@ -126,4 +126,5 @@ TOPICS = {
     "scene": Topic(4, SceneFeed, SceneFeed.__doc__),
     "robot": Topic(5, RobotFeed, RobotFeed.__doc__),
     "belief": Topic(BELIEF_ID, BeliefFeed, BeliefFeed.__doc__),
+    "map": Topic(7, MapFeed, MapFeed.__doc__),
 }

@@ -3,14 +3,20 @@
 import contextlib
 import math
 import socket
+import subprocess
 import threading
+from pathlib import Path
 
 import numpy as np
+from commandkit import command
 from linkkit import free_endpoint
+from patience import PATIENCE_S
 
 from crunchbot import observation as o
-from crunchbot.observation import ODOMETRY
+from crunchbot.observation import ODOMETRY, Row
 from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.link import Link
+from crunchbot.robot.network.rows import RowPublisher
 
 
 def examples() -> dict[str, object]:
@@ -33,6 +39,23 @@ def examples() -> dict[str, object]:
         "pose": m.PoseWithCovarianceStamped(at, pose),
         "localisation": m.Localisation(at, "grid", pose, 0.75, 2**40, 2, 3, 4, 5, "uniform"),
         "belief": m.Belief(at, "grid", 9, 8, 0.875, *components),
+        "map": m.OccupancyGrid(
+            at,
+            m.MapMetaData(0.03125, 3, 2, m.Pose.planar(-0.5, 0.25, 0.0), m.Time(1, 2)),
+            np.array([-1, 0, 50, 99, 100, 1], "i1"),
+        ),
+        "touch_map": m.TouchMap(
+            at,
+            11,
+            ["VINYL", "ROUGH"],
+            rng.random(4),
+            np.array([-1, 0, 2], "i4"),
+            np.array([1, -2, 3], "i4"),
+            np.array([0, 1, 1], "u1"),
+            rng.random(3).astype("f4"),
+            *(rng.random(4).astype("f4") for _ in range(7)),
+            *(rng.random(2).astype("f4") for _ in range(3)),
+        ),
         "truth": m.PoseStamped(at, m.Pose.planar(0.5, 0.25, -1.0)),
         "health/pilot": m.ProcessHealth(at, "pilot", 4321, "running", [m.KeyValue("rows", "7")], "none yet"),
     }
@@ -47,6 +70,39 @@ def flat(message, path: str = "") -> dict[str, object]:
     else:
         pairs = ((f"{path}.{name}", value) for name, value in vars(message).items() if not name.startswith("_"))
     return {key: value for name, item in pairs for key, value in flat(item, name).items()}
+
+
+class Robot:
+    """A pilot's link with a reader of the answers of a navigator, or of what takes its place; and these to start."""
+
+    def __init__(self, *answers: str, lock_step: bool = True):
+        self.pilot_end, self.navigator_end = free_endpoint(), free_endpoint()
+        self.link = Link("pilot", listen=[self.pilot_end], connect=[self.navigator_end], lock_step=lock_step)
+        self.inbox = self.link.subscribe(*answers)
+        self.rows = RowPublisher(self.link)
+        self._lock_step = ["--lock-step"] if lock_step else []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        self.link.close()
+
+    @contextlib.contextmanager
+    def started(self, name: str, folder: Path, *options):
+        """The process `whisker name`; it is there for rows when this returns, and killed at the end if it still runs."""
+        ends = ["--listen", self.navigator_end, "--connect", self.pilot_end, *self._lock_step]
+        child = subprocess.Popen(command(name, folder, *ends, *options), stdout=subprocess.PIPE, text=True)
+        try:
+            assert self.link.wait_for([name], PATIENCE_S)
+            yield child
+        finally:
+            child.kill()
+            child.communicate()
+
+    def send(self, rows) -> None:
+        for row in rows:
+            self.rows.send(Row.of(row))
 
 
 class Cable:

@@ -86,7 +86,16 @@ def test_ros_tools_open_it(bag, scene):
     assert kinds.pop("/robot/health/bag", "whisker_msgs/msg/ProcessHealth") == "whisker_msgs/msg/ProcessHealth"
     assert kinds.pop("/tf") == "tf2_msgs/msg/TFMessage" and kinds.pop("/map") == "nav_msgs/msg/OccupancyGrid"
     frames = {(t.header.frame_id, t.child_frame_id) for one in placed["/tf"] for t in one.transforms}
-    assert ("odom", "base_link") in frames and len(placed["/map"]) == 1
+    assert ("odom", "base_link") in frames
+    of_scene, of_mapper = placed["/map"]
+    assert of_scene.info.width * of_scene.info.height == len(of_scene.data) and of_mapper.data.tolist() == [
+        -1,
+        0,
+        50,
+        99,
+        100,
+        1,
+    ]
     assert kinds == {f"/robot/{topic}": m.SCHEMAS[type(message)] for topic, message in examples().items()}
     assert [row.seq for row in rows] == list(range(ROWS)) and set(np.diff(times)) == {10**8}
     for topic, message in examples().items():

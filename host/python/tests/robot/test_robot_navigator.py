@@ -1,9 +1,7 @@
 """The navigator over loopback: exact in lock-step, right when it skips, honest when it is killed or fed nonsense."""
 
-import contextlib
 import json
 import re
-import subprocess
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +12,7 @@ from commandkit import command, run, signals_as_before  # noqa: F401 - a fixture
 from fuzz_rows import fuzz
 from linkkit import free_endpoint
 from patience import PATIENCE_S
-from robotkit import take_until, to_rows
+from robotkit import Robot, take_until, to_rows
 
 from crunchbot import scene as scene_folder
 from crunchbot.errors import UserError
@@ -44,39 +42,6 @@ def made(tmp_path_factory):
     return folder, scene, to_rows(localise.read_observations(localise.observations_path(folder), scene), scene)
 
 
-class Robot:
-    """A pilot's link with a reader of the navigator's answers, and navigators to start."""
-
-    def __init__(self, *answers: str, lock_step: bool = True):
-        self.pilot_end, self.navigator_end = free_endpoint(), free_endpoint()
-        self.link = Link("pilot", listen=[self.pilot_end], connect=[self.navigator_end], lock_step=lock_step)
-        self.inbox = self.link.subscribe(*answers)
-        self.rows = RowPublisher(self.link)
-        self._lock_step = ["--lock-step"] if lock_step else []
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *exception):
-        self.link.close()
-
-    @contextlib.contextmanager
-    def navigator(self, folder: Path, *options):
-        """A process; it is there for rows when this returns, and killed at the end if it still runs."""
-        ends = ["--listen", self.navigator_end, "--connect", self.pilot_end, *self._lock_step]
-        child = subprocess.Popen(command("navigator", folder, *ends, *options), stdout=subprocess.PIPE, text=True)
-        try:
-            assert self.link.wait_for(["navigator"], PATIENCE_S)
-            yield child
-        finally:
-            child.kill()
-            child.communicate()
-
-    def send(self, rows) -> None:
-        for row in rows:
-            self.rows.send(Row.of(row))
-
-
 def lines(path: Path) -> list[str]:
     return path.read_text().splitlines()
 
@@ -86,7 +51,7 @@ def test_in_lock_step_the_process_gives_what_localise_gives(made, tmp_path):
     filters = ("adaptive", "foveal")
     options = [word for name in filters for word in ("--filter", name)]
     options += ["--out", tmp_path, "--report", tmp_path / "report.json"]
-    with Robot("pose", "localisation", "belief") as robot, robot.navigator(folder, *options) as child:
+    with Robot("pose", "localisation", "belief") as robot, robot.started("navigator", folder, *options) as child:
         robot.send(rows)
         robot.rows.end("enough")
         got = take_until(robot.inbox, lambda got: sum(r.over for r in got) == 3, PATIENCE_S)
@@ -123,12 +88,12 @@ def _all_over(got) -> bool:
 def test_a_killed_navigator_comes_back_knowing_that_it_knows_nothing(made, tmp_path):
     folder, _, rows = made
     with Robot("localisation", "health/*") as robot:
-        with robot.navigator(folder, "--filter", "particle", "--out", tmp_path):
+        with robot.started("navigator", folder, "--filter", "particle", "--out", tmp_path):
             robot.send(rows[:20])
             take_until(robot.inbox, lambda got: sum(r.topic == "localisation" for r in got) == 20, PATIENCE_S)
         assert robot.link.wait_gone("navigator", PATIENCE_S)
         robot.send(rows[20:25])
-        with robot.navigator(folder, "--filter", "particle", "--out", tmp_path) as child:
+        with robot.started("navigator", folder, "--filter", "particle", "--out", tmp_path) as child:
             robot.send(rows[25:])
             robot.rows.end()
             got = take_until(robot.inbox, _all_over, PATIENCE_S)
@@ -146,14 +111,14 @@ def test_a_killed_navigator_comes_back_knowing_that_it_knows_nothing(made, tmp_p
 
 def killed_and_begun_anew(robot, folder, rows, options, spoil=lambda: None):
     """Answers of a navigator that gets rows 25 on, after one that was killed behind row 20; five rows are lost."""
-    with robot.navigator(folder, *options) as child:
+    with robot.started("navigator", folder, *options) as child:
         robot.send(rows[:20])
         take_until(robot.inbox, lambda got: sum(r.topic == "localisation" for r in got) == 20, PATIENCE_S)
         child.kill()
     assert robot.link.wait_gone("navigator", PATIENCE_S)
     spoil()
     robot.send(rows[20:25])
-    with robot.navigator(folder, *options) as child:
+    with robot.started("navigator", folder, *options) as child:
         robot.send(rows[25:])
         robot.rows.end()
         over = take_until(robot.inbox, _all_over, PATIENCE_S)
@@ -503,7 +468,7 @@ def test_a_pose_that_is_reported_while_running_is_gone_on_from(made):
         return seen[first - 1], seen[first]
 
     left = iter(rows)
-    with Robot("localisation", "health/navigator") as robot, robot.navigator(folder, "--filter", "adaptive"):
+    with Robot("localisation", "health/navigator") as robot, robot.started("navigator", folder, "--filter", "adaptive"):
         answers(robot, "localisation", lambda x: x and x.prior == "scene")
         initial_pose.send(robot.link, far_place, (0.02, 0.02, 0.02))
         before, after = answers(robot, "localisation", lambda x: x and x.prior == "given")

@@ -57,7 +57,7 @@ def trained(monkeypatch):
 def test_every_process_of_the_table_has_a_unit(trained, robot, tmp_path, capsys):
     found = written(robot, tmp_path, "--desktop")
     body, meeting = parts.Body(*robot, 1, Path("/dev/ttyUSB3"), 1), parts.Meeting("whisker", tmp_path)
-    table = parts.netbook(body, meeting, True) + parts.desktop(body, meeting, tmp_path / "bag", 8028)
+    table = parts.netbook(body, meeting, parts.NAVIGATOR) + parts.desktop(body, meeting, tmp_path / "bag", 8028)
     names = {program.name for program in table} - {"base"}  # cmake --install brings that of the base, and whiskerd's
     assert found.keys() == {f"whisker-{name}.service" for name in names} | {TARGET}
     wanted = found[TARGET]["Unit"]["Wants"].split()

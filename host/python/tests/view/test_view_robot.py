@@ -1,10 +1,13 @@
 """What whisker-view knows of the robot, and what it sends to a page about it."""
 
 import asyncio
+import base64
 import json
+import math
 import random
 import struct
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -34,12 +37,15 @@ from crunchbot.robot.network.messages import (
     Header,
     KeyValue,
     Localisation,
+    MapMetaData,
     Observation,
+    OccupancyGrid,
     Pose,
     PoseStamped,
     PoseWithCovariance,
     ProcessHealth,
     Time,
+    TouchMap,
     encode,
 )
 from crunchbot.scene import LARGEST_M, Scene
@@ -56,7 +62,7 @@ from crunchbot.view.robot import (
     RobotModel,
 )
 from crunchbot.view.robot_source import join
-from crunchbot.view.robot_topics import BELIEF_HEAD, BELIEF_ID, POINTS_MOST, BeliefFeed, RobotFeed, SceneFeed
+from crunchbot.view.robot_topics import BELIEF_HEAD, BELIEF_ID, POINTS_MOST, BeliefFeed, MapFeed, RobotFeed, SceneFeed
 
 FUZZ_INPUTS = 5000
 WIDE = np.array([[0.0009, 0.0003, 0.0], [0.0003, 0.0016, 0.0], [0.0, 0.0, 0.04]])  # 3 cm by 4 cm, 0.2 rad
@@ -356,3 +362,38 @@ def test_over_a_real_network_a_page_sees_what_a_pilot_sends():
             asyncio.run(scenario(source))
         finally:
             source.close()
+
+
+def test_a_mappers_map_is_shown_and_the_truth_in_its_frame():
+    model = RobotModel(SCENE)
+    feed = MapFeed(SimpleNamespace(robot=model), {})
+    assert feed.take() is None
+    true = [(2.0, 1.0, 1.5), (2.0, 1.5, 1.5 + 0.25)]
+    for n, (place, felt) in enumerate(zip(true, [(0.1, 0.0, 0.0), (0.6, 0.0, 0.2)], strict=True)):
+        header = Header.at((n + 1) * ROW_NS)
+        model.take("truth", PoseStamped(header, Pose.planar(*place)))
+        pose = PoseWithCovariance.planar(felt, np.diag([1e-4, 1e-4, 1e-4]))
+        model.take("localisation", Localisation(header, "mapper", pose, 1.0, n, prior="origin"))
+    forward = 0.5 * math.sin(1.5)
+    expected = (0.1 + forward, 0.5 * math.cos(1.5), 0.25)
+    assert [model.truth[name] for name in ("x", "y", "theta")] == pytest.approx(expected, abs=1e-3)
+    info = MapMetaData(0.03125, 3, 2, Pose.planar(-0.5, 0.25, 0.0))
+    model.take("map", OccupancyGrid(Header.at(ROW_NS), info, np.array([-1, 0, 50, 99, 100, 1], "i1")))
+    tiles = [np.array(column) for column in ([-1, 0, 2], [1, -2, 3], [0, 1, 1], [0.5, 0.9, 1.0])]
+    things = [np.full(4, 0.5)] * 7 + [np.full(2, 0.25)] * 3
+    model.take(
+        "touch_map",
+        TouchMap(Header.at(ROW_NS), 11, ["VINYL", "ROUGH"], np.array([0.0, 0.1, 0.2, 0.5]), *tiles, *things),
+    )
+    reported = json.loads(feed.take())
+    assert reported["topic"] == "map" and feed.take() is None
+    shown = reported["map"]
+    assert shown["textures"] == ["VINYL", "ROUGH"] and shown["lattice"][3] > 0.0
+    assert [tile[:3] for tile in shown["tiles"]] == [[-1, 1, 0], [0, -2, 1], [2, 3, 1]]
+    assert len(shown["faces"]) == 4 and len(shown["faces"][0]) == 7 and len(shown["corners"][0]) == 3
+    grid = shown["grid"]
+    assert list(base64.b64decode(grid["cells"])) == [255, 0, 50, 99, 100, 1]
+    assert (grid["columns"], grid["rows"], grid["x"], grid["y"]) == (3, 2, -0.5, 0.25)
+    model.begin_anew()
+    feed._due = 0.0
+    assert json.loads(feed.take()) == {"topic": "map", "map": None}

@@ -19,7 +19,7 @@ function beliefOf({ poses, total, mass }, scales) {
 /* One filter's plan. */
 class Scene {
   constructor(motion, name, filter) {
-    Object.assign(this, { motion, filter, name, held: -1, belief: new Belief() });
+    Object.assign(this, { motion, filter, name, held: -1, shown: null, belief: new Belief() });
     this.box = make('div', [make('canvas'), make('canvas')], { class: 'plan', role: 'img' });
     this.line = make('p');
     $('motion-plans').append(make('section', [make('h3', filter.title), this.box, this.line]));
@@ -37,8 +37,15 @@ class Scene {
       this.held = newest;
       this.belief = newest < 0 ? new Belief() : beliefOf(this.filter.beliefs[newest], this.motion.data.scales);
     }
+    if (this.filter.maps) this.show(this.filter.maps.findLast((map) => map.row <= row) ?? this.filter.maps[0]);
     this.draw();
     this.tell();
+  }
+
+  show(map) {
+    if (map === this.shown) return;
+    this.shown = map;
+    this.plan.showMap(map);
   }
 
   draw() {
@@ -57,7 +64,8 @@ class Scene {
     const off = Math.atan2(Math.sin(theta - turn), Math.cos(theta - turn));
     const error = `${signed(Math.hypot(x - tx, y - ty), 2)} m and ${signed((Math.abs(off) * 180) / Math.PI, 0)}° off`;
     const belief = this.filter.beliefs.length ? `belief: ${this.belief.said()}` : 'no belief was recorded';
-    this.line.textContent = `${error}; ${belief}`;
+    const said = this.shown && mapSaid(this.shown);
+    this.line.textContent = `${error}; ${said ? `${said.faces}; ${said.tiles}; ${said.area}` : belief}`;
     this.box.setAttribute('aria-label', `Arena from above at ${signed(t, 1)} s. True place x ${signed(tx, 2)} m, y ${signed(ty, 2)} m; ${this.filter.title} says x ${signed(x, 2)} m, y ${signed(y, 2)} m, ${this.line.textContent}`);
   }
 }

@@ -19,6 +19,8 @@ from .ros import (
     Header,
     JointState,
     KeyValue,
+    MapMetaData,
+    OccupancyGrid,
     Odometry,
     Point,
     Pose,
@@ -107,6 +109,28 @@ class Belief:
 
 
 @dataclass(eq=False)
+class TouchMap:
+    header: Header
+    observation_seq: int
+    textures: list[str]
+    lattice: np.ndarray
+    tile_column: np.ndarray
+    tile_row: np.ndarray
+    tile_texture: np.ndarray
+    tile_probability: np.ndarray
+    face_x0: np.ndarray
+    face_y0: np.ndarray
+    face_x1: np.ndarray
+    face_y1: np.ndarray
+    face_normal: np.ndarray
+    face_normal_sd: np.ndarray
+    face_offset_sd: np.ndarray
+    corner_x: np.ndarray
+    corner_y: np.ndarray
+    corner_sd: np.ndarray
+
+
+@dataclass(eq=False)
 class ProcessHealth:
     header: Header
     process: str
@@ -142,9 +166,9 @@ PACKAGES = {
         Twist,
         TwistWithCovariance,
     ),
-    "nav_msgs": (Odometry,),
+    "nav_msgs": (Odometry, MapMetaData, OccupancyGrid),
     "sensor_msgs": (JointState,),
-    "whisker_msgs": (Observation, Contact, Behaviour, Localisation, Belief, ProcessHealth, End),
+    "whisker_msgs": (Observation, Contact, Behaviour, Localisation, Belief, TouchMap, ProcessHealth, End),
 }
 TYPES = {f"{package}/msg/{kind.__name__}": kind for package, kinds in PACKAGES.items() for kind in kinds}
 SCHEMAS = {kind: schema for schema, kind in TYPES.items()}
@@ -162,6 +186,8 @@ TOPICS = {
     "pose": PoseWithCovarianceStamped,
     "localisation": Localisation,
     "belief": Belief,
+    "map": OccupancyGrid,
+    "touch_map": TouchMap,
     "truth": PoseStamped,
     "initial_pose": PoseWithCovarianceStamped,
 }
@@ -220,6 +246,24 @@ def _check_belief(belief: Belief) -> None:
             raise Malformed(f"field {name}: {len(getattr(belief, name))} elements")
 
 
+def _check_grid(grid: OccupancyGrid) -> None:
+    if len(grid.data) != grid.info.width * grid.info.height:
+        raise Malformed(f"field data: {len(grid.data)} cells, {grid.info.width} by {grid.info.height} belong")
+
+
+GROUPS = ("tile_column", "face_x0", "corner_x")  # the first of each group of sequences of a TouchMap
+
+
+def _check_touch_map(touched: TouchMap) -> None:
+    for first in GROUPS:
+        group, length = first.partition("_")[0], len(getattr(touched, first))
+        for name in (name for name in vars(touched) if name.startswith(f"{group}_")):
+            if len(getattr(touched, name)) != length:
+                raise Malformed(f"field {name}: {len(getattr(touched, name))} elements, {length} belong")
+    if len(touched.tile_texture) and touched.tile_texture.max() >= len(touched.textures):
+        raise OutOfRange("field tile_texture: no texture of this number")
+
+
 def _check_covariance(name: str, values: np.ndarray) -> None:
     """No variance is negative, and none is smaller than what it shares with another."""
     matrix = np.reshape(values, (6, 6))
@@ -242,6 +286,8 @@ def _check_pose(message: Localisation | PoseWithCovarianceStamped) -> None:
 CHECKS = {
     Observation: _check_observation,
     Belief: _check_belief,
+    OccupancyGrid: _check_grid,
+    TouchMap: _check_touch_map,
     JointState: _check_joints,
     Odometry: _check_odometry,
     Localisation: _check_pose,

@@ -18,6 +18,8 @@ NAME_MOST, TEXT_MOST = 128, 4096  # characters
 CELLS_MOST = 512  # of a row: whiskers times textures
 COUNTERS_MOST = 256
 COMPONENTS_MOST = 2000  # of a Belief
+GRID_MOST = 1_100_000  # cells of an occupancy grid: the mapper's reach, at its cells, squared, with room to spare
+TILES_MOST, FACES_MOST, CORNERS_MOST = 4096, 1024, 2048  # of a TouchMap
 SHARE_MOST = 1.01  # of a share of a belief, with room for rounding
 
 
@@ -64,6 +66,14 @@ _TABLE = {
     "geometry_msgs/msg/Twist": {"linear": INNER, "angular": INNER},
     "geometry_msgs/msg/TwistWithCovariance": {"twist": INNER, "covariance": COVARIANCE},
     "nav_msgs/msg/Odometry": {"header": INNER, "child_frame_id": NAME, "pose": INNER, "twist": INNER},
+    "nav_msgs/msg/MapMetaData": {
+        "map_load_time": INNER,
+        "resolution": up_to(FAR_M),
+        "width": up_to(GRID_MOST),
+        "height": up_to(GRID_MOST),
+        "origin": INNER,
+    },
+    "nav_msgs/msg/OccupancyGrid": {"header": INNER, "info": INNER, "data": Range(-1, 100, count=GRID_MOST)},
     "sensor_msgs/msg/JointState": {
         "header": INNER,
         "name": up_to(NAME_MOST, count=CELLS_MOST),
@@ -118,6 +128,21 @@ _TABLE = {
         "weight": up_to(SHARE_MOST, count=COMPONENTS_MOST),
         "sigma_m": up_to(FAR_M, count=COMPONENTS_MOST),
         "sigma_rad": up_to(TURNED_RAD, count=COMPONENTS_MOST),
+    },
+    "whisker_msgs/msg/TouchMap": {
+        "header": INNER,
+        "observation_seq": COUNTER,
+        "textures": up_to(NAME_MOST, count=CELLS_MOST),
+        "lattice": Range((-FAR_M, -FAR_M, -TURNED_RAD, 0.0), (FAR_M, FAR_M, TURNED_RAD, FAR_M)),
+        **dict.fromkeys(("tile_column", "tile_row"), about(FAR_M, count=TILES_MOST)),
+        "tile_texture": up_to(CELLS_MOST, count=TILES_MOST),
+        "tile_probability": up_to(SHARE_MOST, count=TILES_MOST),
+        **dict.fromkeys(("face_x0", "face_y0", "face_x1", "face_y1"), about(FAR_M, count=FACES_MOST)),
+        "face_normal": about(TURNED_RAD, count=FACES_MOST),
+        "face_normal_sd": up_to(TURNED_RAD, count=FACES_MOST),
+        "face_offset_sd": up_to(FAR_M, count=FACES_MOST),
+        **dict.fromkeys(("corner_x", "corner_y"), about(FAR_M, count=CORNERS_MOST)),
+        "corner_sd": up_to(FAR_M, count=CORNERS_MOST),
     },
     "whisker_msgs/msg/ProcessHealth": {
         "header": INNER,

@@ -155,3 +155,23 @@ class JointState:
     position: np.ndarray
     velocity: np.ndarray = ()
     effort: np.ndarray = ()
+
+
+@dataclass(eq=False)
+class MapMetaData:
+    """origin: pose of the corner of cell 0; resolution: m a cell."""
+
+    resolution: float
+    width: int
+    height: int
+    origin: Pose
+    map_load_time: Time = field(default_factory=Time)
+
+
+@dataclass(eq=False)
+class OccupancyGrid:
+    """data: (width * height,) int8, the lowest row first: per cent that something solid is there; -1: not known."""
+
+    header: Header
+    info: MapMetaData
+    data: np.ndarray

@@ -12,7 +12,7 @@ from .children import Program
 
 FIRST_PORT = 7457  # of three: supervisor, pilot, navigator; the latter two are those of robot.link
 LOOPBACK = "127.0.0.1"
-BRIDGE = "bridge"
+BRIDGE, NAVIGATOR, MAPPER = "bridge", "navigator", "mapper"
 
 BASE_STEADY_S = 1.0  # a base that is started again stops the wheels: it comes at once
 
@@ -65,6 +65,11 @@ class Places:
     def checkpoint(self) -> Path:
         """The navigator's checkpoint. The folder is made for the run, so no checkpoint is older than the run."""
         return self.folder / "navigator.checkpoint"
+
+    @property
+    def journal(self) -> Path:
+        """The mapper's rows; as old as the run, too."""
+        return self.folder / "mapper.journal"
 
     @property
     def environment(self) -> Path:
@@ -131,6 +136,9 @@ class Table:
     def navigator(self) -> list:
         return [*whisker("navigator"), self.body.scene]
 
+    def mapper(self, out: Path) -> list:
+        return [*whisker("mapper"), self.body.scene, "--seed", self.body.seed, "--out", out]
+
     def bag(self, file: Path) -> list:
         return [*whisker("bag"), file, "--scene", self.body.scene]
 
@@ -152,23 +160,29 @@ def daemon(body: Body, meeting: Meeting, simulated: bool) -> Program:
     return Program.of("whiskerd", command)
 
 
-def netbook(body: Body, meeting: Meeting, with_desktop: bool) -> list[Program]:
-    """Base and pilot. The pilot is the last, so that it is ended first, and stops the wheels."""
+def netbook(body: Body, meeting: Meeting, awaited: str | None) -> list[Program]:
+    """Base and pilot, which waits for the process `awaited`. The pilot is the last, so that it is ended first, and stops
+    the wheels."""
     table = Table(body, meeting)
     pilot = [*table.pilot(), "--base", meeting.base, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
-    pilot += [*meeting.options, *(["--await", "navigator"] if with_desktop else [])]
+    pilot += [*meeting.options, *(["--await", awaited] if awaited else [])]
     return [
         Program.of("base", [*table.base(), "--wait"], moves=True, fed=True, steady_s=BASE_STEADY_S),
         Program.of("pilot", pilot, reports=True, moves=True),
     ]
 
 
-def desktop(body: Body, meeting: Meeting, bag: Path | None, view_port: int | None) -> list[Program]:
-    """Navigator, and, where they are wanted, bag and view."""
+def desktop(
+    body: Body, meeting: Meeting, bag: Path | None, view_port: int | None, map_folder: Path | None = None
+) -> list[Program]:
+    """Navigator, or a mapper in its place that writes `map_folder`; and, where they are wanted, bag and view."""
     commands = Table(body, meeting)
-    navigator = [*commands.navigator(), "--stay", "--checkpoint", meeting.checkpoint]
-    navigator += ["--listen", meeting.endpoint(2), "--connect", meeting.endpoint(1), *meeting.options]
-    table = [Program.of("navigator", navigator, reports=True)]
+    if map_folder:
+        name, command = MAPPER, [*commands.mapper(map_folder), "--journal", meeting.journal]
+    else:
+        name, command = NAVIGATOR, [*commands.navigator(), "--checkpoint", meeting.checkpoint]
+    command += ["--stay", "--listen", meeting.endpoint(2), "--connect", meeting.endpoint(1), *meeting.options]
+    table = [Program.of(name, command, reports=True)]
     everybody = [word for number in range(3) for word in ("--connect", meeting.endpoint(number))] + meeting.options
     if bag:
         table.append(Program.of("bag", [*commands.bag(bag), "--stay", "--next", *everybody], reports=True))

@@ -11,7 +11,7 @@ from .children import Program
 from .parts import Meeting
 
 TARGET = "whisker-robot.target"
-WATCHDOG_S = {"pilot": 2, "navigator": 10, "bag": 10}  # the view has no such loop
+WATCHDOG_S = {"pilot": 2, "navigator": 10, "mapper": 10, "bag": 10}  # the view has no such loop
 UNIT = """\
 [Unit]
 Description=Whiskered robot: {name}
@@ -68,6 +68,14 @@ class Installed(Meeting):
     @property
     def checkpoint(self) -> Path:
         return state("navigator") / "navigator.checkpoint"
+
+    @property
+    def journal(self) -> Path:
+        return state("mapper") / "mapper.journal"
+
+    @property
+    def map_folder(self) -> Path:
+        return state("mapper") / "map"
 
     @property
     def bag(self) -> Path:

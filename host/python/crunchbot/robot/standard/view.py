@@ -133,6 +133,12 @@ class StandardView:
         grid = shapes.belief(reported, self._scene.arena, _header(wall_ns, MAP_FRAME))
         yield Standard("/belief", wall_ns, grid)
 
+    def _take_map(self, grid, _: int, wall_ns: int) -> Iterator[Standard]:
+        """A mapper's, in place of the scene's."""
+        info = make("nav_msgs/MapMetaData", **vars(grid.info))
+        fields = {"header": _header(wall_ns, MAP_FRAME), "info": info, "data": np.asarray(grid.data, np.int8)}
+        yield Standard("/map", wall_ns, make("nav_msgs/OccupancyGrid", **fields))
+
     def _take_joints(self, joints, _: int, wall_ns: int) -> Iterator[Standard]:
         angles = np.asarray(joints.position, float)
         message = make(

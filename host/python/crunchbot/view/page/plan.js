@@ -16,19 +16,33 @@ class Plan {
     this.box = box;
     [this.floor, this.live] = box.querySelectorAll('canvas');
     this.scene = null; // as topic scene holds it
+    this.map = null; // as topic map holds it: in the arena's place, for it has a frame of its own
+    this.mapLayer = new MapLayer(this);
     this.bounds = [0, 0, 1, 1];
     new ResizeObserver(() => { if (box.clientWidth && box.clientWidth !== this.wide) this.layOut(); }).observe(box);
   }
 
   show(scene) {
     this.scene = scene;
-    if (scene.arena) this.bounds = [0, 0, ...scene.arena.size_m];
+    if (scene.arena && !this.map) this.bounds = [0, 0, ...scene.arena.size_m];
     this.layOut();
+  }
+
+  get arena() { return this.map ? null : this.scene?.arena; }
+
+  /* A map that grows, in place of the arena; null: the arena again. */
+  showMap(map) {
+    const wanted = map ? mapBounds(map) : [0, 0, ...(this.scene?.arena?.size_m ?? [1, 1])];
+    const fits = Boolean(map) === Boolean(this.map) && wanted.every((value, n) => value === this.bounds[n]);
+    this.map = map;
+    this.bounds = wanted;
+    if (fits && this.scale) this.drawFloor();
+    else this.layOut();
   }
 
   /* Without an arena: as much as is needed to show these points, by whole steps so that it seldom moves. */
   fit(points) {
-    if (this.scene?.arena || !points.length) return;
+    if (this.map || this.scene?.arena || !points.length) return;
     const side = (axis, round, pick) => round(pick(...points.slice(-500).map((p) => p[axis])) / 0.5 + (round === Math.ceil ? 1 : -1)) * 0.5;
     const wanted = [side(0, Math.floor, Math.min), side(1, Math.floor, Math.min), side(0, Math.ceil, Math.max), side(1, Math.ceil, Math.max)];
     const inside = wanted[0] >= this.bounds[0] && wanted[1] >= this.bounds[1] && wanted[2] <= this.bounds[2] && wanted[3] <= this.bounds[3];
@@ -64,7 +78,8 @@ class Plan {
   drawFloor() {
     const pen = this.floor.getContext('2d');
     pen.clearRect(0, 0, this.floor.width, this.floor.height);
-    if (this.scene?.arena) this.drawArena(pen, this.scene.arena);
+    if (this.map) this.mapLayer.draw(pen, this.map);
+    if (this.arena) this.drawArena(pen, this.arena);
     this.drawAxes(pen);
     this.drawScale(pen);
   }
@@ -126,15 +141,15 @@ class Plan {
 
   drawAxes(pen) {
     const [x0, y0, x1, y1] = this.bounds;
-    const steps = this.scene?.arena ? [1, 2, 5, 10, 20, 50, 100].map((tiles) => tiles * this.scene.arena.tile_m) : STEPS_M;
+    const steps = this.arena ? [1, 2, 5, 10, 20, 50, 100].map((tiles) => tiles * this.arena.tile_m) : STEPS_M;
     const step = steps.find((s) => s * this.scale >= 46 * this.ratio) ?? steps.at(-1);
     const ticks = (from, to) => Array.from({ length: Math.floor((to - from) / step + 1e-6) + 1 }, (_, n) => Number((Math.ceil(from / step - 1e-6) * step + n * step).toFixed(3)));
     const axis = (metres) => signed(metres, step % 0.1 > 1e-6 && step % 0.1 < 0.1 - 1e-6 ? 2 : 1);
     for (const x of ticks(x0, x1)) this.text(pen, axis(x), this.x(x), this.bottom + 11 * this.ratio, '--soft', 11, 'center');
     for (const y of ticks(y0, y1)) this.text(pen, axis(y), this.left - 5 * this.ratio, this.y(y), '--soft', 11, 'right');
     pen.strokeStyle = this.css('--ink');
-    pen.lineWidth = (this.scene?.arena ? 2 : 1) * this.ratio;
-    if (!this.scene?.arena) pen.setLineDash([2 * this.ratio, 4 * this.ratio]); // what is shown, not walls
+    pen.lineWidth = (this.arena ? 2 : 1) * this.ratio;
+    if (!this.arena) pen.setLineDash([2 * this.ratio, 4 * this.ratio]); // what is shown, not walls
     pen.strokeRect(this.left, this.y(y1), (x1 - x0) * this.scale, (y1 - y0) * this.scale);
     pen.setLineDash([]);
   }

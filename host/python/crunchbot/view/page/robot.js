@@ -17,16 +17,17 @@ class RobotPart {
     wire.on('scene', (scene) => this.showScene(scene));
     wire.on('robot', (word) => this.take(word));
     wire.on('belief', (message) => this.takeBelief(message));
+    wire.on('map', (word) => this.takeMap(word.map));
     this.note(robotAdvice(null));
   }
 
   forget() {
-    this.world = { word: null, stale: false, path: [], truth: [], contacts: [], surfaces: [], belief: new Belief() };
+    this.world = { word: null, stale: false, path: [], truth: [], contacts: [], surfaces: [], belief: new Belief(), map: null };
   }
 
   /* Subscribes while the part is looked at: a page of traces costs nobody a belief. */
   look(shown) {
-    for (const topic of ['scene', 'robot', 'belief']) {
+    for (const topic of ['scene', 'robot', 'belief', 'map']) {
       if (!shown) this.wire.unsubscribe(topic);
       else if (!this.wire.wanted.has(topic)) this.wire.subscribe(topic, {});
     }
@@ -41,9 +42,16 @@ class RobotPart {
   showScene(scene) {
     this.scene = scene;
     this.plan.show(scene);
-    $('scene').textContent = scene.arena ? `${signed(scene.arena.size_m[0], 2)} m × ${signed(scene.arena.size_m[1], 2)} m, tiles of ${signed(scene.arena.tile_m, 2)} m` : scene.text;
-    $('textures').replaceChildren(...(scene.arena?.textures ?? []).map((name, nth) => this.swatch(name, nth)));
+    this.showTitle();
+    if (!this.world.map) $('textures').replaceChildren(...(scene.arena?.textures ?? []).map((name, nth) => this.swatch(name, nth)));
     this.redraw();
+  }
+
+  showTitle() {
+    const arena = this.scene?.arena;
+    const known = arena ? `${signed(arena.size_m[0], 2)} m × ${signed(arena.size_m[1], 2)} m, tiles of ${signed(arena.tile_m, 2)} m` : this.scene?.text ?? 'not reported yet';
+    $('plan-title').textContent = this.world.map ? 'Map from above' : 'Arena from above';
+    $('scene').textContent = this.world.map ? 'as felt so far; the origin is the first pose' : known;
   }
 
   swatch(name, nth) {
@@ -73,6 +81,18 @@ class RobotPart {
   takeBelief(message) {
     this.world.belief.take(message);
     if (this.world.word) this.tell(this.world.word);
+    this.redraw();
+  }
+
+  /* null: a run without a mapper. */
+  takeMap(map) {
+    this.world.map = map;
+    this.plan.showMap(map);
+    this.showTitle();
+    $('map-card').hidden = $('map-legend').hidden = !map;
+    $('obstacle-legend').hidden = Boolean(map);
+    $('textures').replaceChildren(...(map ?? this.scene?.arena)?.textures.map((name, nth) => this.swatch(name, nth)) ?? []);
+    if (map) tellMap(map);
     this.redraw();
   }
 

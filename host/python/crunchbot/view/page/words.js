@@ -34,6 +34,11 @@ function tellPose(word, belief) {
   ]);
 }
 
+function tellMap(map) {
+  const { faces, tiles, area, corners } = mapSaid(map);
+  pairsOf($('map'), [['Faces', faces], ['Corners', corners], ['Floor', tiles], ['Ground', area], ['As of row', count(map.seq)]]);
+}
+
 function tellBehaviour(word) {
   const doing = word.behaviour;
   pairsOf($('behaviour'), [
