@@ -90,8 +90,8 @@ ROOMS = {
         "signals": [],
         "simulation": [],
         "scenes": ["simulation"],
-        "report": [],
-        "demo": ["signals", "simulation", "report"],
+        "report": ["scenes"],
+        "demo": ["signals", "simulation", "scenes", "report"],
         "commands": ["simulation", "scenes", "report"],
     },
 }

@@ -201,7 +201,7 @@ def score(mapped: Mapped, arena: Arena) -> dict[str, float | None]:
 
 
 def judged(mapped: Mapped, arena: Arena) -> dict[str, float | None]:
-    """The figures of poses and map, whoever made them."""
+    """The figures of poses and map, of any SLAM."""
     poses, truth = mapped.table["pose"], mapped.rows.truth
     motion = best_motion(poses[:, :2], truth[:, :2])
     beside = trajectory(odometry_path(mapped.rows.odometry), truth)

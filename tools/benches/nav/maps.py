@@ -35,7 +35,7 @@ TABLES = {  # of the page: family -> rows
     )
     | {"free": 18000},
 }
-HARD_SHARE, LONG_SHARE = 5, 20  # of the seeds: every so manieth is run in a hard world, or for 30 minutes
+HARD_SHARE, LONG_SHARE = 5, 20  # seeds of a family to one of a hard world, and to one of 30 minutes
 SWEPT, PARTICLES = ("anchor", "raw"), (1, 4, 12, 36)
 SWEEP_SEEDS = 3  # at most
 INPUTS = ("host/nav", "host/python/crunchbot/nav", "lab/crunchbot_lab/scenes", "tools/benches/nav/maps.py")
@@ -74,7 +74,7 @@ def summed(runs: list[dict]) -> dict:
 
 
 def seeds_of(table: str, rows: int, seeds: int) -> range:
-    """Hard worlds and long runs are told by fewer."""
+    """Fewer of hard worlds and of long runs."""
     share = LONG_SHARE if rows > ROWS else HARD_SHARE if table == "hard" else 1
     return range(FIRST_SEED, FIRST_SEED + max(1, seeds // share))
 
