@@ -23,7 +23,6 @@ from .page import loss_table
 from .run import read_columns
 
 FRAME_S = 4.0  # between two maps of the motion
-MARGIN_M = 0.3  # about the arena
 TOPICS = {"/map": OccupancyGrid, "/touch_map": TouchMap}
 STYLES = {
     "mapper": ("mapper", {"color": "#0b5394", "linestyle": "-"}),
@@ -151,15 +150,13 @@ def motion_data(run: MapRun) -> dict:
     """What the page's script is given; all in the arena's frame."""
     scene = {"arena": asdict(run.scene.arena), "robot": asdict(replace(run.scene.robot, sensors=())), "text": ""}
     poses = {"poses": _points(run.seconds, run.poses), "beliefs": []}
-    size = run.scene.arena.size_m
-    bounds = [-MARGIN_M, -MARGIN_M, size[0] + MARGIN_M, size[1] + MARGIN_M]
-    maps = [frame | {"bounds": bounds} for frame in map_frames(run)]
+    maps = [frame | {"bounds": [0.0, 0.0, *run.scene.arena.size_m]} for frame in map_frames(run)]
     return {
         "scene": scene,
         "truth": _points(run.seconds, run.truth),
         "scales": [1.0],
         "filters": {
-            "arena": {"title": "The arena, which the robot does not know"} | poses,
+            "arena": {"title": "The arena, which the robot does not know", "note": "obstacles are grey"} | poses,
             "map": {"title": "The map"} | poses | {"maps": maps},
         },
     }

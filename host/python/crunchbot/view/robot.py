@@ -33,6 +33,7 @@ SILENT_S = 3.0  # a process speaks once a second
 BACK_S = 2.0  # a clock that goes back so far has begun anew
 EXPECTED = ("pilot", "navigator")  # shown as not heard, until they are
 MAPPER, SAME_NS = "mapper", 1_000_000  # the filter's name in its answers; two stamps of one row
+TRUTHS_MOST = 100  # kept for a mapper's answer of the same time: 10 s
 KINDS = ("exploring", "body whisk", "after a whisk")
 PARTS = {TIP: "tip", SHAFT: "shaft"}
 SHAPES = {FACE: "face", CORNER: "corner"}
@@ -120,7 +121,7 @@ class RobotModel:
         self.pose = self.truth = self.behaviour = self.row = self.belief = None
         self.grid = self.touched = None  # of a mapper
         self._anchor: tuple | None = None  # a true pose, and the mapper's at that time
-        self._true: tuple[int, tuple] | None = None  # the newest truth: stamp, pose
+        self._true: deque[tuple[int, tuple]] = deque(maxlen=TRUTHS_MOST)  # stamp, pose
         self.path, self.true_path = Path(), Path()
         self.contacts: dict[tuple[str, int], dict] = {}
         self.surfaces = Surfaces()
@@ -193,15 +194,16 @@ class RobotModel:
 
     def _note_mapper(self, reported) -> None:
         """A mapper's frame is its own: the truth is shown in it, by the first row of which both are known."""
-        if reported.filter != MAPPER or self._anchor or self._true is None:
+        if reported.filter != MAPPER or self._anchor:
             return
-        stamp_ns, true = self._true
-        if abs(stamp_ns - reported.header.stamp.ns) <= SAME_NS:
+        wanted_ns = reported.header.stamp.ns
+        true = next((pose for stamp_ns, pose in self._true if abs(stamp_ns - wanted_ns) <= SAME_NS), None)
+        if true is not None:
             self._anchor, self.true_path = (true, reported.pose.pose.xytheta), Path()
 
     def _take_truth(self, reported) -> None:
         true = reported.pose.xytheta
-        self._true = (reported.header.stamp.ns, true)
+        self._true.append((reported.header.stamp.ns, true))
         if self._anchor:
             reported.pose = Pose.planar(*compose(self._anchor[1], between(self._anchor[0], true)))
         elif self._filter == MAPPER:

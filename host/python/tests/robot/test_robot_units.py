@@ -72,6 +72,15 @@ def test_every_process_of_the_table_has_a_unit(trained, robot, tmp_path, capsys)
     assert "--ring-owner whisker" in pilot["Service"]["ExecStart"] and TARGET in capsys.readouterr().out
 
 
+def test_a_mapper_takes_the_navigators_place(trained, robot, tmp_path):
+    found = written(robot, tmp_path, "--map")
+    assert "whisker-navigator.service" not in found
+    mapper = found["whisker-mapper.service"]["Service"]
+    assert "--journal /var/lib/whisker-mapper/mapper.journal" in mapper["ExecStart"]
+    assert "--out /var/lib/whisker-mapper/map" in mapper["ExecStart"] and mapper["WatchdogSec"] == "10"
+    assert "--await mapper" in found["whisker-pilot.service"]["Service"]["ExecStart"]
+
+
 def test_systemd_finds_nothing_wrong(trained, robot, tmp_path):
     if not (analyze := shutil.which("systemd-analyze")):
         pytest.skip("systemd-analyze is not installed")

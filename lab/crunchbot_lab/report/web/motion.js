@@ -63,7 +63,7 @@ class Scene {
     const [, tx, ty, turn] = this.motion.data.truth[this.row];
     const off = Math.atan2(Math.sin(theta - turn), Math.cos(theta - turn));
     const error = `${signed(Math.hypot(x - tx, y - ty), 2)} m and ${signed((Math.abs(off) * 180) / Math.PI, 0)}° off`;
-    const belief = this.filter.beliefs.length ? `belief: ${this.belief.said()}` : 'no belief was recorded';
+    const belief = this.filter.note ?? (this.filter.beliefs.length ? `belief: ${this.belief.said()}` : 'no belief was recorded');
     const said = this.shown && mapSaid(this.shown);
     this.line.textContent = `${error}; ${said ? `${said.faces}; ${said.tiles}; ${said.area}` : belief}`;
     this.box.setAttribute('aria-label', `Arena from above at ${signed(t, 1)} s. True place x ${signed(tx, 2)} m, y ${signed(ty, 2)} m; ${this.filter.title} says x ${signed(x, 2)} m, y ${signed(y, 2)} m, ${this.line.textContent}`);

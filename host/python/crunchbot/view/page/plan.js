@@ -78,10 +78,21 @@ class Plan {
   drawFloor() {
     const pen = this.floor.getContext('2d');
     pen.clearRect(0, 0, this.floor.width, this.floor.height);
-    if (this.map) this.mapLayer.draw(pen, this.map);
+    if (this.map) this.drawMap(pen);
     if (this.arena) this.drawArena(pen, this.arena);
     this.drawAxes(pen);
     this.drawScale(pen);
+  }
+
+  /* Nothing of it outside the axes. */
+  drawMap(pen) {
+    const [x0, y0, x1, y1] = this.bounds;
+    pen.save();
+    pen.beginPath();
+    pen.rect(this.left, this.y(y1), (x1 - x0) * this.scale, (y1 - y0) * this.scale);
+    pen.clip();
+    this.mapLayer.draw(pen, this.map);
+    pen.restore();
   }
 
   drawArena(pen, arena) {
