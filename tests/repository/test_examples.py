@@ -53,6 +53,7 @@ WITH_ROBOT = {
     "whisker robot": FOREVER,
     "whisker pilot": FOREVER,
     "whisker navigator": FOREVER,
+    "whisker mapper": FOREVER,
     "whisker foxglove": FOREVER,
     "whisker ros2": FOREVER,
     "whisker bag": FOREVER,
@@ -201,6 +202,7 @@ def robot(tmp_path_factory, place):
 def test_examples_beside_a_robot(robot, place, command):
     more = {
         "whisker navigator": "--listen none",
+        "whisker mapper": "--listen none",
         "whisker pilot": f"--listen none --ring {RING}-4",
         "whisker foxglove": f"--port 0 --connect tcp/127.0.0.1:{robot + 1}",
         "whisker ros2": f"--connect tcp/127.0.0.1:{robot + 1} --router {free_endpoint()}",

@@ -19,7 +19,7 @@ from crunchbot_lab.scenes.sweep import sweep
 
 from .. import store
 from ..markdown import table
-from . import charts
+from . import charts, own_maps
 
 PAPER = ("anchor", "robot", "raw", "noisy")
 TABLES = {  # of the page: family -> rows
@@ -35,10 +35,13 @@ TABLES = {  # of the page: family -> rows
     )
     | {"free": 18000},
 }
-HARD_SHARE, LONG_SHARE = 5, 20  # seeds of a family to one of a hard world, and to one of 30 minutes
+OWN_SHARE, HARD_SHARE, LONG_SHARE = 2, 5, 20  # seeds of a family to one of an own map, a hard world, 30 minutes
 SWEPT, PARTICLES = ("anchor", "raw"), (1, 4, 12, 36)
 SWEEP_SEEDS = 3  # at most
-INPUTS = ("host/nav", "host/python/crunchbot/nav", "lab/crunchbot_lab/scenes", "tools/benches/nav/maps.py")
+INPUTS = (
+    *("host/nav", "host/python/crunchbot/nav", "lab/crunchbot_lab/scenes"),
+    *("tools/benches/nav/maps.py", "tools/benches/nav/own_maps.py"),
+)
 ROWS, FIRST_SEED = 3000, 500
 WORKERS = 2
 PAGE = store.ROOT / "docs/results/map.md"
@@ -75,7 +78,7 @@ def summed(runs: list[dict]) -> dict:
 
 def seeds_of(table: str, rows: int, seeds: int) -> range:
     """Fewer of hard worlds and of long runs."""
-    share = LONG_SHARE if rows > ROWS else HARD_SHARE if table == "hard" else 1
+    share = LONG_SHARE if rows > ROWS else {"hard": HARD_SHARE, "own": OWN_SHARE}.get(table, 1)
     return range(FIRST_SEED, FIRST_SEED + max(1, seeds // share))
 
 
@@ -93,11 +96,20 @@ def measure(seeds: int, workers: int) -> dict:
         parts[family, particles, lattice] = list(names)
         options = {"family": family, "particles": particles, "lattice": lattice}
         jobs |= {name: options | job for name, job in names.items()}
-    found = sweep(one, jobs, store.kept("map", *INPUTS), workers, label="map")
+    mine = {
+        family: {f"own-{family}-{n}": {"family": family, "seed": n, "rows": ROWS} for n in seeds_of("own", ROWS, seeds)}
+        for family in PAPER
+    }
+    folder = store.kept("map", *INPUTS)
+    own = sweep(
+        own_maps.one, {n: j for jobs in mine.values() for n, j in jobs.items()}, folder, workers, label="own map"
+    )
+    found = sweep(one, jobs, folder, workers, label="map")
     sums = {key: summed([found[name] for name in names]) for key, names in parts.items()}
     tables = {title: {f: sums[title, f] | {"rows": rows} for f, rows in t.items()} for title, t in TABLES.items()}
     swept = [{"family": f, "particles": p, "lattice": lattice, **sums[f, p, lattice]} for f, p, lattice in sizes]
-    return {"rows": ROWS, "seeds": seeds, "sweep": swept, **tables}
+    own_sums = {family: own_maps.summed([own[name] for name in names]) for family, names in mine.items()}
+    return {"rows": ROWS, "seeds": seeds, "sweep": swept, "own": own_sums, **tables}
 
 
 def chart(data: dict) -> matplotlib.figure.Figure:
@@ -137,6 +149,21 @@ def rows_of(found: dict[str, dict]) -> list[list[str]]:
     return out
 
 
+OWN_HEAD = ["family", "runs", "locked, true map", "locked, own map", "in time", "rows, true", "rows, own"]
+OWN_HEAD += ["error, true, mm", "error, own, mm", "ratio"]
+
+
+def own_rows(found: dict[str, dict]) -> list[list[str]]:
+    """A row of the page a family."""
+    out = []
+    for family, one_family in found.items():
+        counts = [str(one_family[key]) for key in ("runs", "locked_true", "locked_own", "in_time")]
+        rows = [_cell(one_family[f"{key}_rows_median"], 1, 0) for key in ("true", "own")]
+        errors = [_cell(one_family[f"{key}_error_m_median"], 1000, 0) for key in ("true", "own")]
+        out.append([family, *counts, *rows, *errors, _cell(one_family["error_ratio_median"], 1, 2)])
+    return out
+
+
 def page(data: dict) -> str:
     """docs/results/map.md."""
     titles = [title for title, *_ in COLUMNS]
@@ -158,7 +185,13 @@ def page(data: dict) -> str:
         + "\n## Hard worlds\n\n"
         "`whisker scene make --list-families` says what each is. Where the floor has no tiles, or the wall no "
         "straight faces, tiles, faces and corners are judged against the fine tiles and boxes that stand for them; "
-        "after textures were renamed, by their first names.\n\n" + hard + "\n## Error against cost\n\n"
+        "after textures were renamed, by their first names.\n\n" + hard + "\n## In its own map\n\n"
+        f"A second drive of {own_maps.ROWS} rows from an unknown start within {own_maps.VISITED_M:g} m of the first one's "
+        f"path; the filter `{own_maps.FILTER}` in the map that the first drive left, and on the same rows in the true map. In "
+        f"time: at most {own_maps.SLOWER:g} times the rows. Ratio: error in the own map over the root of (error of the "
+        f"mapping poses squared + error in the true map squared), {own_maps.WORSE:g} wanted.\n\n"
+        + table(OWN_HEAD, own_rows(data["own"]))
+        + "\n## Error against cost\n\n"
         "![error against cost by the number of hypotheses](../charts/map.svg)\n\n"
         "Numbers beside the points: hypotheses held at a time; the default is "
         f"{default_particles()}.\n"
