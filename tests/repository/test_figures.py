@@ -114,7 +114,7 @@ FIGURES = (
         "levels",
         lambda d: tuple(
             f"{d['bytes'][at]['realtime_factor'] / d['rtl, SCK/6, gap 0.5 us'][at]['realtime_factor']:.{digits}f}"
-            for at, digits in ((2, 1), (0, 0))
+            for at, digits in ((-1, 1), (0, 0))
         ),
     ),
     *(

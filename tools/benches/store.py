@@ -35,7 +35,7 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tools/benches damage": (("damage",), ()),
     "tools/benches host": (("host",), ("host_cable", "host_clock")),
     "tools/benches image": (("node_image",), ()),
-    "tools/benches levels": (("levels",), ("levels_speed",)),
+    "tools/benches levels": (("levels", "levels_shares"), ("levels_shares", "levels_speed")),
     "tools/benches map": (("map",), ("map",)),
     "tools/benches mechanics": (
         ("mechanics", "mechanics_edges"),

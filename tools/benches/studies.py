@@ -93,7 +93,7 @@ def _localisation(seeds: dict) -> list[list[str]]:
     return rows
 
 
-def simulation(chain: dict, levels: dict) -> str:
+def simulation(chain: dict, levels: dict, parts: dict) -> str:
     """docs/results/simulation.md."""
     whole = [
         ["whole chain to the pilot, SCK/6", str(run["lanes"]), "", f"{run['realtime_factor']:.2f}"]
@@ -121,7 +121,7 @@ def simulation(chain: dict, levels: dict) -> str:
     return (
         head(
             "Speed of the simulation",
-            "`bench/results/chain_speed.json` and `levels.json`",
+            "`bench/results/chain_speed.json`, `levels.json` and `levels_shares.json`",
             "`tools/benches chain` and `tools/benches levels`",
         )
         + "\n## The chain at RTL level\n\n"
@@ -135,6 +135,36 @@ def simulation(chain: dict, levels: dict) -> str:
         "`--level bytes` sends the same bytes without a clock ([what it leaves out](../../sim/bridge/README.md)).\n\n"
         "![Simulated seconds per processor second of both levels](../charts/levels_speed.svg)\n\n"
         + table(["lanes", *cases, *(f"{cases[0]} / {case}" for case in cases[1:])], by_lanes)
+        + _parts(parts)
+    )
+
+
+def _parts(found: dict) -> str:
+    """Where the time of the simulated bridge goes, and what bounds it."""
+    limits = found["limits"]
+    rows = [
+        [
+            level,
+            str(point["lanes"]),
+            f"{point['realtime_factor']:.3g}",
+            f"{limits[level]:.0f}",
+            *(f"{100 * share:.0f}" for share in point["shares"].values()),
+        ]
+        for level, points in found["levels"].items()
+        for point in points
+    ]
+    names = [f"{name}, %" for name in found["levels"]["rtl"][0]["shares"]]
+    return (
+        "\n## Where the time goes\n\n"
+        "Processor time of a tick, by part, from samples of the running program; above each bar: simulated seconds per "
+        "processor second. Level `rtl` at SCK/6.\n\n"
+        "![Processor time per tick by part, one and many lanes, at both levels](../charts/levels_shares.svg)\n\n"
+        + table(["level", "lanes", "times real time", "limit", *names], rows)
+        + f"\nThe limit of `rtl`: Verilator evaluates a module of {limits['registers']} registers and no logic "
+        f"{limits['empty_cycles_per_s'] / 1e6:.0f} million times a processor second, and a tick takes "
+        f"{found['cycles_per_tick']:.0f} cycles. The limit of `bytes`: memory is copied at "
+        f"{limits['copied_bytes_per_s'] / 1e9:.1f} GB a processor second, read and written, and every frame is written "
+        "once and read once. The rest is the host that checks every frame, the drawing of fields and the system.\n"
     )
 
 

@@ -2,7 +2,7 @@
 
 Both run with the internal host of `whisker-bridge-sim --bench`, which checks every frame. Counted is processor time, in
 one thread, less that of a short run (start-up), so other programs on the machine matter little; on a free core it is
-the wall's.
+the wall's. Where it goes, by part of the simulation: shares.py.
 """
 
 import resource
@@ -14,18 +14,21 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from .. import store
-from .chain import LINKS
+from . import shares
+from .chain import LINKS, bridge_speed
 
-LANES = (1, 6, 28)
+LANES = (1, 6, 12, 28)
 FASTEST, HARDWARE = LINKS.values()
 # Level, link settings, simulated seconds. Without a clock the settings of the link cost nothing.
 CASES = {
-    "bytes": ("bytes", FASTEST, 4.0),
-    "rtl, SCK/6, gap 0.5 us": ("rtl", FASTEST, 1.0),
-    "rtl, SCK/16, gap 3 us (hardware)": ("rtl", HARDWARE, 0.5),
+    "bytes": ("bytes", FASTEST, 40.0),
+    "rtl, SCK/6, gap 0.5 us": ("rtl", FASTEST, 2.0),
+    "rtl, SCK/16, gap 3 us (hardware)": ("rtl", HARDWARE, 1.0),
 }
 START_UP_S = 0.1  # simulated, of the short run
 REPEATS = 3
+TICKS_PER_S = 2000
+SHARED = {"rtl": "rtl, SCK/6, gap 0.5 us", "bytes": "bytes"}  # level -> its case in the chart of the parts
 
 
 def processor_s(command: list) -> float:
@@ -36,11 +39,16 @@ def processor_s(command: list) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
+def bench_of(build: Path, case: str, lanes: int) -> list:
+    """The command of a case, less its seconds."""
+    level, (divider, gap, sample), _ = CASES[case]
+    command = [build / "sim/robot/whisker-bridge-sim", "--bench", "--level", level, "--lanes-populated", lanes]
+    return [*command, "--sck-divider", divider, "--word-gap", gap, "--sample-point", sample, "--seconds"]
+
+
 def speed(build: Path, case: str, lanes: int) -> float:
     """Simulated seconds per second of one processor."""
-    level, (divider, gap, sample), seconds = CASES[case]
-    command = [build / "sim/robot/whisker-bridge-sim", "--bench", "--level", level, "--lanes-populated", lanes]
-    command += ["--sck-divider", divider, "--word-gap", gap, "--sample-point", sample, "--seconds"]
+    command, seconds = bench_of(build, case, lanes), CASES[case][2]
     return seconds / (processor_s([*command, START_UP_S + seconds]) - processor_s([*command, START_UP_S]))
 
 
@@ -68,8 +76,31 @@ def draw(found: dict) -> Figure:
     return figure
 
 
+def measure_shares(build: Path, found: dict) -> dict:
+    """Processor time of a tick by part, at both levels, and the limits beside it."""
+    levels = {}
+    for level, case in SHARED.items():
+        levels[level] = [
+            {
+                "lanes": point["lanes"],
+                "realtime_factor": point["realtime_factor"],
+                "us_per_tick": 1e6 / (TICKS_PER_S * point["realtime_factor"]),
+                "shares": shares.shares([*bench_of(build, case, point["lanes"]), CASES[case][2]]),
+            }
+            for point in tqdm(found[case], desc=f"shares, {level}", unit="run")
+        ]
+    cycles = bridge_speed(build, LANES[0], FASTEST)["cycles_per_tick"]
+    return {"levels": levels, "cycles_per_tick": cycles, "limits": shares.limits(cycles)}
+
+
 def run(build: Path) -> None:
-    """Half a minute in all: nothing is kept between runs."""
+    """Two minutes in all: nothing is kept between runs."""
     found = measure(build)
     store.write_result("levels", found)
     store.write_chart("levels_speed", draw(found))
+    try:
+        parts = measure_shares(build, found)
+    except RuntimeError as error:
+        return store.leave_out("shares of the parts", str(error))
+    store.write_result("levels_shares", parts)
+    store.write_chart("levels_shares", shares.draw(parts["levels"]))
