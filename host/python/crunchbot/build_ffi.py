@@ -51,6 +51,7 @@ HEADERS = {
             "filter/replay.h",
             "filter/weigh.h",
             "mapping/mapper.h",
+            "planning/planner.h",
         )
     ],
     "whisker": [

@@ -96,7 +96,9 @@ class Explorer:
         for _ in range(BLOCKS_PER_ROW):
             self.block()
         (x, y, heading), (to_x, to_y, to_heading) = self.path[-1], self.pose
-        self.behaviour.moved(self.tick - 1, math.hypot(to_x - x, to_y - y), 0.0, to_heading - heading)
+        middle = (heading + to_heading) / 2.0
+        ahead = (to_x - x) * math.cos(middle) + (to_y - y) * math.sin(middle)  # negative while it backs off
+        self.behaviour.moved(self.tick - 1, ahead, 0.0, to_heading - heading)
         self._held.append(self.behaviour.whisking and not self.measured)
         self._sweeping.append(self.sweeping(self._was_whisking))
         self._radial.append(self.radial())
