@@ -10,8 +10,8 @@ enum { PLANNER_MOST = NAV_PLANNER_HYPOTHESES_MOST, PLANNER_WHISKERS_MOST = 64, P
 
 static const double PLANNER_CIRCLE = 6.283185307179586;
 static const double PLANNER_AGAIN_M = 0.05, PLANNER_AGAIN_RAD = 0.2617993877991494; /* half of a step */
-/* Distances are foretold in steps of so much; two that differ by two steps or less are taken for one: a belief's poses are
- * no more exact than that. */
+/* Distances are foretold in steps of so much; two that differ by two steps or less are taken for one: a belief's poses
+ * are no more exact than that. */
 static const double PLANNER_REACH_M = 0.01;
 static const uint8_t PLANNER_REACH_SLACK = 2;
 static const double PLANNER_SECONDS_LEAST = 1e-6;
@@ -50,8 +50,8 @@ struct nav_planner {
     struct nav_planner_path *path;
     struct planner_end *end;   /* [ends] */
     struct planner_seen *seen; /* [ends], path by path */
-    int n, first, last;      /* hypotheses, and those taken to be true in turn */
-    double open_bits;        /* entropy of the place */
+    int n, first, last;        /* hypotheses, and those taken to be true in turn */
+    double open_bits;          /* entropy of the place */
     long spent;
     float share[NAV_INFORMATION_LEVELS];
     struct planner_state start, base, way;
@@ -295,9 +295,10 @@ static bool planner_may_go_on(const struct nav_planner *p)
     return p->options.budget <= 0 || p->spent < p->options.budget;
 }
 
-/* Follows every path from `from`. Ends that the entropy left makes worse than `best` (bits per second) are not looked
- * at. out: NULL, or room for all ends looked at; returns how many there are; *best is that of the best. */
-static int planner_follow(struct nav_planner *p, const struct planner_state *from, struct planner_end *out, double *best)
+/* Follows every path from `from`, as far as the entropy left may make it better than `best` (bits per second). out:
+ * NULL, or room for all ends looked at; returns how many there are; *best is that of the best. */
+static int planner_follow(struct nav_planner *p, const struct planner_state *from, struct planner_end *out,
+                          double *best)
 {
     int found = 0;
     const struct planner_seen *seen = p->seen;
@@ -311,7 +312,9 @@ static int planner_follow(struct nav_planner *p, const struct planner_state *fro
         for (int n = 0; n < p->path[k].count && planner_may_go_on(p) && (!first || seen[n].open); n++) {
             planner_step(p, &p->path[k].step[n], !first || seen[n].fresh);
             double seconds = planner_seconds(p);
-            if (!p->path[k].step[n].ends || p->open_bits <= *best * seconds)
+            if (p->open_bits <= *best * seconds)
+                break; /* no end further on is better, for it takes longer and tells no more than all */
+            if (!p->path[k].step[n].ends)
                 continue;
             struct planner_end end = {k, n + 1, planner_bits(p), seconds, planner_passed(p)};
             if (end.bits >= p->options.floor_bits && planner_rate(&end) > *best)
@@ -335,13 +338,15 @@ static void planner_go(struct nav_planner *p, const struct planner_end *end)
         planner_step(p, &p->path[end->path].step[n], seen[n].fresh);
 }
 
-static int planner_better(const void *a, const void *b)
+/* Puts the best of the ends from number `first` on at its place; of equal ones, the one that was found first. */
+static void planner_put_best(struct planner_end *end, int first, int count)
 {
-    const struct planner_end *one = a, *other = b;
-    double by = planner_rate(other) - planner_rate(one);
-    if (by != 0.0)
-        return by > 0.0 ? 1 : -1;
-    return one->path != other->path ? one->path - other->path : one->steps - other->steps;
+    int best = first;
+    for (int k = first + 1; k < count; k++)
+        best = planner_rate(&end[k]) > planner_rate(&end[best]) ? k : best;
+    struct planner_end chosen = end[best];
+    memmove(&end[first + 1], &end[first], (size_t)(best - first) * sizeof *end);
+    end[first] = chosen;
 }
 
 static void planner_set(struct nav_planner *p, const double *poses, int n, int truth)
@@ -362,8 +367,7 @@ static void planner_set(struct nav_planner *p, const double *poses, int n, int t
         for (int j = 0; j < n; j++) {
             double x = p->start.x[i] - p->start.x[j], y = p->start.y[i] - p->start.y[j];
             double turn = remainder(p->start.turn[i] - p->start.turn[j], PLANNER_CIRCLE);
-            p->same[i * PLANNER_MOST + j] =
-                hypot(x, y) < p->options.place_m && fabs(turn) < p->options.place_rad;
+            p->same[i * PLANNER_MOST + j] = hypot(x, y) < p->options.place_m && fabs(turn) < p->options.place_rad;
             held += p->same[i * PLANNER_MOST + j];
         }
         if (i >= p->first && i < p->last)
@@ -400,13 +404,34 @@ static bool planner_see(struct nav_planner *p, const struct nav_planner_past *pa
     struct planner_seen *seen = p->seen;
     bool any = false;
     for (int k = 0; k < p->paths; k++) {
+        bool open = true;
         for (int n = 0; n < p->path[k].count; n++, seen++) {
             const struct nav_planner_step *step = &p->path[k].step[n];
-            *seen = (struct planner_seen){!planner_been(past, step), !planner_in_way(p, past, step)};
+            open = open && !planner_in_way(p, past, step);
+            *seen = (struct planner_seen){!planner_been(past, step), open};
             any = any || (seen->open && !step->turns);
         }
     }
     return any;
+}
+
+/* Of the best ends, the one whose path with the best second path after it has most bits per second of both. */
+static const struct planner_end *planner_with_second(struct nav_planner *p, int choices)
+{
+    const struct planner_end *chosen = &p->end[0];
+    double best = planner_rate(chosen);
+    for (int k = 0; k < choices && k < p->options.after && planner_may_go_on(p); k++) {
+        double both = best;
+        planner_put_best(p->end, k, choices);
+        planner_go(p, &p->end[k]);
+        p->base = p->way;
+        planner_follow(p, &p->base, NULL, &both);
+        if (both > best) {
+            best = both;
+            chosen = &p->end[k];
+        }
+    }
+    return chosen;
 }
 
 void nav_planner_plan(struct nav_planner *p, const double *poses, int n, int truth, const struct nav_planner_past *past,
@@ -422,23 +447,12 @@ void nav_planner_plan(struct nav_planner *p, const double *poses, int n, int tru
     double best = 0.0;
     int found = planner_follow(p, &p->start, p->end, &best), choices = 0;
     for (int k = 0; k < found; k++) {
-        out->best_bits = fmax(out->best_bits, p->end[k].bits);
         if (p->end[k].bits >= p->options.floor_bits)
             p->end[choices++] = p->end[k];
     }
     if (choices > 0) {
-        qsort(p->end, (size_t)choices, sizeof *p->end, planner_better);
-        const struct planner_end *chosen = &p->end[0];
-        for (int k = 0; k < choices && k < p->options.after && planner_may_go_on(p); k++) {
-            double both = best;
-            planner_go(p, &p->end[k]);
-            p->base = p->way;
-            planner_follow(p, &p->base, NULL, &both);
-            if (both > best) {
-                best = both;
-                chosen = &p->end[k];
-            }
-        }
+        planner_put_best(p->end, 0, choices);
+        const struct planner_end *chosen = planner_with_second(p, choices);
         out->path = chosen->path;
         out->steps = chosen->steps;
         out->bits = chosen->bits;

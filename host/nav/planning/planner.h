@@ -2,8 +2,8 @@
  *
  * A belief is n hypotheses of equal weight. What whiskers would meet at any pose is a table; along a path, the readings
  * of every two hypotheses lie so many nats apart (information.h), and the bits that they tell of the place follow. Work
- * is counted in pairs of hypotheses, never in time, so that the same belief gives the same plan on any machine; when the
- * budget is spent, the best path so far stands. Nothing is allocated after nav_planner_new. */
+ * is counted in pairs of hypotheses, never in time, so that the same belief gives the same plan on any machine; when
+ * the budget is spent, the best path so far stands. Nothing is allocated after nav_planner_new. */
 #ifndef NAV_PLANNER_H
 #define NAV_PLANNER_H
 
@@ -26,7 +26,7 @@ struct nav_planner_ground {
     int columns, rows;
     double x, y, cell;      /* lower left corner, edge of a cell: m */
     const uint8_t *texture; /* [rows][columns], row 0 has the smallest y: class; NAV_PLANNER_NOTHING: not known */
-    const float *clear;     /* [rows][columns] m from a cell's middle to what is solid; beyond the cells it is all solid */
+    const float *clear; /* [rows][columns] m from a cell's middle to what is solid; beyond the cells it is all solid */
 };
 
 /* A step of a path. */
@@ -59,7 +59,6 @@ struct nav_planner_plan {
     int path, steps;      /* which path, and how many of its steps; path -1: none is expected to tell floor_bits */
     bool shut_in;         /* what was met is in the way of every drive */
     double bits, seconds; /* expected of it */
-    double best_bits;     /* the most bits that any path is expected to tell */
     double passed;        /* share of the hypotheses that nothing stops on it */
     long spent;           /* of the budget */
 };
@@ -73,18 +72,19 @@ struct nav_planner_past {
 
 struct nav_planner;
 
-/* Copies options, robot and the paths' list; the ground's arrays and the paths' steps must outlive it. NULL: no memory, or
- * out of range. */
+/* Copies options, robot and the paths' list; the ground's arrays and the paths' steps must outlive it. NULL: no memory,
+ * or out of range. */
 struct nav_planner *nav_planner_new(const struct nav_planner_ground *, const struct nav_robot *,
                                     const struct nav_planner_path *, int paths, const struct nav_planner_options *);
 void nav_planner_free(struct nav_planner *);
 
-/* The best path for n hypotheses: poses[n][3], x, y (m), theta (rad). truth: which of them is taken to be true; -1: each
- * in turn, as likely as any other. */
+/* The best path for n hypotheses: poses[n][3], x, y (m), theta (rad). truth: which of them is taken to be true; -1:
+ * each in turn, as likely as any other. */
 void nav_planner_plan(struct nav_planner *, const double *poses, int n, int truth, const struct nav_planner_past *,
                       struct nav_planner_plan *out);
 
-/* Bits that a reading of the object whiskers is expected to tell where the robot stands, of `nats` between two codes. */
+/* Bits that a reading of the object whiskers is expected to tell where the robot stands, of `nats` between two codes.
+ */
 double nav_planner_touch(struct nav_planner *, const double *poses, int n, int truth, double nats);
 /* cffi: end */
 

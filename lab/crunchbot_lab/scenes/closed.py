@@ -14,7 +14,7 @@ from crunchbot.nav.filters import FAVOURITE, Filter
 from crunchbot.nav.observations import Observations
 from crunchbot.nav.scoring import LOCK_ROWS, lock_row, position_errors
 from crunchbot.pilot.choices import Choices
-from crunchbot.pilot.states import EXPLORE_M_S, FULL, ODOMETRY_TICKS, TICK_S, TURN_RAD_S
+from crunchbot.pilot.states import CLEAR_M, EXPLORE_M_S, FULL, ODOMETRY_TICKS, TICK_S, TURN_RAD_S
 from crunchbot.pilot.whereabouts import Whereabouts
 from crunchbot.planning.actions import Vehicle
 from crunchbot.scene import Arena, Prior, Robot, Scene
@@ -29,7 +29,7 @@ from .readings import odometry
 
 SETTLE_S = (SETTLE_TICKS + ODOMETRY_TICKS) * TICK_S  # from a change of speed to the end of the first window that counts
 LOOK_ROWS = 20  # between looks at whether it is locked
-WHISK_S, CONTACT_S = 4.0, 0.5  # of the explorer's body whisks, with its way back, and of the latter alone
+WHISK_S = 4.0  # of the explorer's body whisks, with its way back
 AGAIN = 1_000_000  # added to the seed after a kidnap
 
 
@@ -54,6 +54,7 @@ class Stroller:
         self.path = [self.pose]
         self.whereabouts, self.turned_away = Whereabouts(), -1
         self._turn = self._drive = self._curve = 0.0
+        self._met = True  # the last drive was stopped, or there was none
 
     def row(self) -> None:
         """Go on for 0.1 s."""
@@ -71,6 +72,10 @@ class Stroller:
 
     def _choose(self) -> None:
         tick = len(self.path) * ODOMETRY_TICKS
+        self._drive = 0.0 if self._met else self.choices.on(self, tick)
+        if self._drive > 0.0:
+            return
+        self._met = False
         self._turn = self.choices.turn(self, tick, 60.0, 180.0)
         self._drive = self.choices.distance(self, tick) if self._turn else 0.0
         self._curve = 0.0
@@ -86,7 +91,7 @@ class Stroller:
         if self._free(*to):
             self.pose = (*to, heading + self._curve)
         else:
-            self._drive = 0.0
+            self._drive, self._met = 0.0, True
             self.whereabouts.meet(len(self.path) * ODOMETRY_TICKS, 0.0)
 
 
@@ -95,6 +100,10 @@ class RandomStroll:
 
     def __init__(self, rng: np.random.Generator):
         self._rng = rng
+
+    def on(self, b: object, tick: int) -> float:
+        """As in pilot.choices.Choices."""
+        return 0.0
 
     def turn(self, b: object, tick: int, least_deg: float, most_deg: float) -> float:
         """As in pilot.choices.Choices."""
@@ -153,7 +162,7 @@ class Loop:
     def vehicle(self) -> Vehicle:
         """Speeds and costs of this family's robot."""
         if self.recipe.body_whisks:
-            return Vehicle(EXPLORE_M_S, TURN_RAD_S, CONTACT_S, WHISK_S, SETTLE_S)
+            return Vehicle(EXPLORE_M_S, TURN_RAD_S, CLEAR_M / EXPLORE_M_S, WHISK_S, SETTLE_S)
         pace = self.recipe.pace
         return Vehicle(pace.step_m / ROW_S, pace.turn_rad / ROW_S, settle_s=ROW_S, reads_always=True)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crunchbot.planning.choices import Planned
-from crunchbot.planning.places import ArenaMap, Places
+from crunchbot.planning.ground import ArenaMap, Ground
 from crunchbot.planning.planner import Planner
 from crunchbot_lab.scenes.closed import Loop, RandomStroll
 from crunchbot_lab.scenes.families import KIDNAP_LEAST_M
@@ -18,7 +18,7 @@ def as_it_is(loop, random):
 
 
 def planned(loop, random):
-    return Planned(Planner(Places.of(ArenaMap(loop.arena), loop.robot), loop.vehicle, 1), loop.belief, random)
+    return Planned(Planner(Ground.of(ArenaMap(loop.arena), loop.robot), loop.vehicle), loop.belief, random)
 
 
 @pytest.mark.parametrize("family", ["anchor+global", "robot+global"])

@@ -1,4 +1,5 @@
-"""Makes plans, and nothing else: what `nav_active` counts the instructions of. Arguments: how many, and steps of each."""
+"""Makes plans, and nothing else: what `nav_active` counts the instructions of. Arguments: how many, and
+first actions that are looked at with a second one."""
 
 import sys
 
@@ -7,16 +8,16 @@ import numpy as np
 from crunchbot.nav.filters import COMPONENT
 from crunchbot.pilot.states import EXPLORE_M_S, TURN_RAD_S
 from crunchbot.planning.actions import Vehicle
-from crunchbot.planning.places import ArenaMap, Places
+from crunchbot.planning.ground import ArenaMap, Ground
 from crunchbot.planning.planner import Planner
 from crunchbot_lab.simulation.scenes import make_scene
 
 
-def plans(count: int, steps: int) -> None:
+def plans(count: int, after: int) -> None:
     """`count` plans of the demo's robot, each for 500 components anywhere."""
     scene, rng = make_scene(1)[0], np.random.default_rng(1)
     planner = Planner(
-        Places.of(ArenaMap(scene.arena), scene.robot), Vehicle(EXPLORE_M_S, TURN_RAD_S, 0.5, 4.0, 0.25), steps
+        Ground.of(ArenaMap(scene.arena), scene.robot), Vehicle(EXPLORE_M_S, TURN_RAD_S, 0.5, 4.0, 0.25), after
     )
     for _ in range(count):
         belief = np.zeros(500, COMPONENT)

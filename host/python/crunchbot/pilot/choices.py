@@ -14,6 +14,10 @@ from .states import EXPLORE_M_S
 class Choices(Protocol):
     """Asked by the behaviour `b` at a tick; `b` is read only."""
 
+    def on(self, b: Any, tick: int) -> float:
+        """At the end of a drive: how far to go on as now, m; 0: a turn comes first. May be asked more than once at a tick."""
+        ...
+
     def turn(self, b: Any, tick: int, least_deg: float, most_deg: float) -> float:
         """Angle of the next turn, rad, anticlockwise; 0: no turn is worth it now, stand still and ask again. A random one has
         between `least_deg` and `most_deg`."""
@@ -33,6 +37,10 @@ class Random:
 
     def __init__(self, rng: np.random.Generator):
         self._rng = rng
+
+    def on(self, b: Any, tick: int) -> float:
+        """As in `Choices`: never."""
+        return 0.0
 
     def turn(self, b: Any, tick: int, least_deg: float, most_deg: float) -> float:
         """As in `Choices`."""

@@ -116,6 +116,10 @@ def far_enough(b, tick: int) -> bool:
     return b.done >= b.goal
 
 
+def far_enough_and_on_it_goes(b, tick: int) -> bool:
+    return far_enough(b, tick) and b.choices.on(b, tick) > 0.0
+
+
 def far_enough_or_stuck(b, tick: int) -> bool:
     return far_enough(b, tick) or stuck(b, tick)
 

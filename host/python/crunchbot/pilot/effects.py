@@ -21,6 +21,10 @@ def draw_distance(b, tick: int) -> None:
     b.goal = b.choices.distance(b, tick)
 
 
+def go_on(b, tick: int) -> None:
+    b.goal = b.choices.on(b, tick)
+
+
 def draw_turn(b, tick: int, least_deg: float, most_deg: float) -> None:
     turn = b.choices.turn(b, tick, least_deg, most_deg)
     b.goal, b.sign = abs(turn), math.copysign(1.0, turn) if turn else 0.0

@@ -40,6 +40,7 @@ RULES = (
     Rule(S.FORWARD, when.stuck_again_here, S.ESCAPE, then.escape_block),
     Rule(S.FORWARD, when.stuck, S.CLEAR, then.clear_of_block),
     Rule(S.FORWARD, when.floor_whisker_caught, S.CLEAR, then.clear_of_catch),
+    Rule(S.FORWARD, when.far_enough_and_on_it_goes, S.FORWARD, then.go_on),
     Rule(S.FORWARD, when.far_enough, S.TURN, then.draw_small_turn),
     Rule(S.TURN, when.no_turn_is_worth_it, S.WAIT),
     Rule(S.TURN, when.touched_since_again_here, S.ESCAPE, then.escape_touch),

@@ -32,6 +32,11 @@ class Vehicle:
     settle_s: float = 0.0
     reads_always: bool = False
 
+    @property
+    def stopped_s(self) -> float:
+        """What it costs to be stopped: the way back, and a quarter turn away, for the way ahead is closed."""
+        return self.contact_s + math.pi / 2.0 / self.turn_rad_s + 2.0 * self.settle_s
+
 
 @dataclass(frozen=True)
 class Leg:

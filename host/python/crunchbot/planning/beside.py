@@ -15,6 +15,10 @@ class Along:
     def __init__(self) -> None:
         self._met = False
 
+    def on(self, b: Any, tick: int) -> float:
+        """As in pilot.choices.Choices."""
+        return 0.0
+
     def turn(self, b: Any, tick: int, least_deg: float, most_deg: float) -> float:
         """As in pilot.choices.Choices."""
         self._met = least_deg >= 60.0  # the turn after something was in the way
@@ -34,6 +38,10 @@ class Lanes:
 
     def __init__(self) -> None:
         self._side, self._across = 1.0, False
+
+    def on(self, b: Any, tick: int) -> float:
+        """As in pilot.choices.Choices."""
+        return 0.0
 
     def turn(self, b: Any, tick: int, least_deg: float, most_deg: float) -> float:
         """As in pilot.choices.Choices."""

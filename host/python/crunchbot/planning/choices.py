@@ -19,11 +19,19 @@ class Planned:
     def __init__(self, planner: Planner, belief: Belief, otherwise: Choices, truth: Truth | None = None):
         self._planner, self._belief, self._otherwise, self._truth = planner, belief, otherwise, truth
         self.plan = Plan()
+        self._tick = -1  # of the plan
+        self.plans = 0  # made so far
         self._drive: float | None = None  # that follows the turn that was asked for, m
+
+    def on(self, b: Any, tick: int) -> float:
+        """As in pilot.choices.Choices."""
+        self._renew(b, tick)
+        turn, drive = self.plan.moves[0] if self.plan.path else (0.0, 0.0)
+        return drive if turn == 0.0 else 0.0
 
     def turn(self, b: Any, tick: int, least_deg: float, most_deg: float) -> float:
         """As in pilot.choices.Choices."""
-        self.plan, self._drive = self._planned(b), None
+        self._renew(b, tick)
         if self.plan.refused == NOTHING_TOLD:
             return 0.0
         if self.plan.path is None:
@@ -47,9 +55,15 @@ class Planned:
         truth = None if self._truth is None else self._truth()
         return self._planner.whisk(components, truth).bits_per_s > self._planned(b).bits_per_s
 
+    def _renew(self, b: Any, tick: int) -> None:
+        """The plan becomes that of this tick."""
+        if tick != self._tick:
+            self.plan, self._tick, self._drive = self._planned(b), tick, None
+
     def _planned(self, b: Any) -> Plan:
         components = self._belief()
         if components is None:
             return Plan()
         truth = None if self._truth is None else self._truth()
+        self.plans += 1
         return self._planner.plan(components, Past(b.whereabouts.things(), b.whereabouts.been()), truth)

@@ -97,7 +97,8 @@ class Ground:
 
     def says_nothing(self) -> bool:
         """Whether every pose in which the body fits reads the same, so that no action can ever tell one from another."""
-        if any(_far(whisker) > self.robot.body_radius_m for whisker in self.robot.of_role("object")):
+        feels = any(_far(whisker) > self.robot.body_radius_m for whisker in self.robot.of_role("object"))
+        if feels and (self.clear_m == 0.0).any():
             return False
         floor = self.texture[self.clear_m > 0.0]
         return not self.robot.of_role("texture") or not len(floor) or bool((floor == floor[0]).all())

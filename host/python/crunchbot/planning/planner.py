@@ -14,7 +14,7 @@ from .actions import Path, Vehicle, all_round
 from .ground import Ground
 
 HYPOTHESES = 96
-BUDGET = 5_000_000  # pairs of hypotheses times readings: below 16 million instructions
+BUDGET = 6_500_000  # pairs of hypotheses times readings: below 16 million instructions
 PLACE_M, PLACE_RAD = 0.25, math.radians(30.0)  # poses nearer to each other are one place
 STOP_NATS = 3.0  # a body does not go through what is solid: as much as a contact and its repetition in the next rows
 CLEARANCE_M = 0.2  # from the robot's middle to what was met a while ago
@@ -90,7 +90,7 @@ class Planner:
         self._nothing = ground.says_nothing()
         options = {
             "touch_stops": not vehicle.reads_always,
-            "contact_s": vehicle.contact_s,
+            "contact_s": vehicle.stopped_s,
             "stop_nats": STOP_NATS,
             "place_m": PLACE_M,
             "place_rad": PLACE_RAD,
@@ -101,11 +101,15 @@ class Planner:
         }
         known, self._keep = _ground(ground)
         steps = [ffi.new("struct nav_planner_step[]", list(map(_step, path.steps))) for path in self.paths]
-        listed = ffi.new("struct nav_planner_path[]", [(len(p.steps), s) for p, s in zip(self.paths, steps, strict=True)])
+        listed = ffi.new(
+            "struct nav_planner_path[]", [(len(p.steps), s) for p, s in zip(self.paths, steps, strict=True)]
+        )
         made = ffi.NULL
         if 1 <= most <= lib.NAV_PLANNER_HYPOTHESES_MOST:
             robot, keep = _robot(ground)
-            made = lib.nav_planner_new(known, robot, listed, len(steps), ffi.new("struct nav_planner_options *", options))
+            made = lib.nav_planner_new(
+                known, robot, listed, len(steps), ffi.new("struct nav_planner_options *", options)
+            )
             del keep  # until here
         if made == ffi.NULL:
             raise ValueError(f"{len(steps)} paths, {most} hypotheses: out of range, or no memory; give fewer")

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..nav.filters import COMPONENT
 from ..pilot.choices import Choices
-from ..pilot.states import EXPLORE_M_S, TURN_RAD_S
+from ..pilot.states import CLEAR_M, EXPLORE_M_S, TURN_RAD_S
 from ..planning.actions import Vehicle
 from ..planning.beside import Along, Lanes
 from ..planning.choices import Planned
-from ..planning.places import ArenaMap, Places
+from ..planning.ground import ArenaMap, Ground
 from ..planning.planner import Planner
 from ..scene import Scene
 from .network.link import Link
@@ -21,7 +21,7 @@ from .network.link import Link
 RANDOM, PLAN = "random", "plan"
 POLICIES = (RANDOM, PLAN, "wall", "lanes")
 AGE_ROWS = 30  # an older belief is none
-CONTACT_S, WHISK_S, SETTLE_S = 0.5, 4.0, 0.25  # of the behaviour's way back, body whisk and change of speed, about
+WHISK_S, SETTLE_S = 4.0, 0.25  # of the behaviour's body whisk with its way back, and change of speed, about
 
 
 class FollowedBelief:
@@ -63,8 +63,8 @@ def _moved(poses: np.ndarray, then: np.ndarray, now: np.ndarray) -> np.ndarray:
 def choices_of(name: str, scene: Scene, belief: Callable[[], np.ndarray | None], random: Choices) -> Choices:
     """The choices of this name of POLICIES; `random`: the behaviour's own."""
     if name == PLAN:
-        vehicle = Vehicle(EXPLORE_M_S, TURN_RAD_S, CONTACT_S, WHISK_S, SETTLE_S)
-        return Planned(Planner(Places.of(ArenaMap(scene.arena), scene.robot), vehicle, steps=1), belief, random)
+        vehicle = Vehicle(EXPLORE_M_S, TURN_RAD_S, CLEAR_M / EXPLORE_M_S, WHISK_S, SETTLE_S)
+        return Planned(Planner(Ground.of(ArenaMap(scene.arena), scene.robot), vehicle), belief, random)
     return {RANDOM: random, "wall": Along(), "lanes": Lanes()}[name]
 
 
@@ -77,5 +77,5 @@ def expected(choices: Choices) -> dict[str, str]:
         return {"expects": f"0 bits: {plan.refused}"}
     if plan.seconds == 0.0:
         return {"expects": "no belief yet"}
-    turn = f"turn {math.degrees(plan.turn_rad):.0f} degrees, drive {plan.distance_m:.1f} m"
-    return {"expects": f"{plan.bits:.1f} bits in {plan.seconds:.1f} s: {turn}"}
+    moves = ", ".join(f"turn {math.degrees(turn):.0f} degrees, drive {drive:.1f} m" for turn, drive in plan.moves)
+    return {"expects": f"{plan.bits:.1f} bits in {plan.seconds:.1f} s: {moves}"}

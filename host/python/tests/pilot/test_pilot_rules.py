@@ -19,7 +19,7 @@ from crunchbot.pilot.behaviour import (
     State,
 )
 from crunchbot.pilot.rules import RULES, SPEEDS
-from crunchbot.pilot.states import FULL, LOST_TICKS, TIP_SLACK_RAD, WAIT_TICKS, TipMove
+from crunchbot.pilot.states import EXPLORE_M_S, FULL, LOST_TICKS, TIP_SLACK_RAD, WAIT_TICKS, TipMove
 from crunchbot.pilot.tip import AIM_MM, contact_type, move_for_tip
 from crunchbot.pilot.wheels import EXACT, NO_BUMPS, Bumps, Wheels
 from crunchbot.pilot.whereabouts import Whereabouts
@@ -162,10 +162,15 @@ def set_down():
 
 
 class Chosen:
-    """Choices that are given: a turn, and whether to whisk; a second turn is left."""
+    """Choices that are given: how far the first drive goes on, a turn, and whether to whisk; a second turn is left."""
 
-    def __init__(self, turn=0.5, whisk=False):
-        self.turns, self.worth = [turn], whisk
+    def __init__(self, turn=0.5, whisk=False, on=0.0):
+        self.turns, self.worth, self.further = [turn], whisk, on
+        self.asked = None  # tick at which it was first asked whether to go on
+
+    def on(self, b, tick):
+        self.asked = tick if self.asked is None else self.asked
+        return self.further if tick == self.asked else 0.0
 
     def turn(self, b, tick, least_deg, most_deg):
         return self.turns.pop() if self.turns else 0.5
@@ -185,7 +190,15 @@ def choosing(*states, **chosen):
     return robot
 
 
+def going_on():
+    robot = choosing(on=0.4)
+    while robot.behaviour.goal == 0.3:
+        robot.block()
+    return robot
+
+
 SCRIPTS = (
+    going_on,
     lambda: choosing(State.WAIT, State.TURN, turn=0.0),
     lambda: touched(choosing(), State.CLEAR),
     exploring,
@@ -233,6 +246,13 @@ def test_a_turn_is_the_chosen_one():
     assert (robot.behaviour.goal, robot.behaviour.sign) == (0.8, -1.0)
     robot.until(State.FORWARD)
     assert robot.behaviour.goal == 0.3
+
+
+def test_it_goes_on_without_a_stop():
+    robot = going_on()
+    behaviour = robot.behaviour
+    assert (behaviour.state, behaviour.goal, behaviour.drive) == (State.FORWARD, 0.4, (EXPLORE_M_S, 0.0))
+    assert behaviour.drive_since < behaviour.since - 0.3 / EXPLORE_M_S / TICK_S + 2 * BLOCK_TICKS
 
 
 def test_what_is_known_on_one_side_does_not_turn_a_robot_that_stands():
