@@ -35,6 +35,7 @@ FAMILIES = (
     *("free+global", "small+global", "large+global", "symmetric2+global", "raw+kidnap"),  # it was not made for these
 )
 ROWS, FIRST_SEED = 1200, 74_000
+INPUTS = ("host/nav", "host/python/crunchbot", "lab/crunchbot_lab", "tools/benches/nav/bound.py")  # of a run
 REPEATS = (1, 3)  # plans of the two runs whose difference is counted
 ATOM_HZ = 0.8e9  # instructions per second of the paper's netbook
 SECOND_OF = 3  # first actions after which `two-step` looks into a second one
@@ -194,7 +195,7 @@ def run(_build: Path, seeds: int = 30, workers: int = 1) -> None:
         for family in FAMILIES
         for policy in POLICIES
     }
-    folder = store.kept("nav_active")
+    folder = store.kept("nav_active", *INPUTS)
     found = sweep(one, jobs, folder, workers, "processes" if workers > 1 else "serial", "nav_active")
     by = {f: {p: [found[f"{f}_{p}_{s}"] for s in range(seeds)] for p in POLICIES} for f in FAMILIES}
     families = {f: {p: judged(runs, of["random"]) for p, runs in of.items()} for f, of in by.items()}
