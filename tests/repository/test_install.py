@@ -4,6 +4,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from catkin_pkg.package import parse_package
@@ -253,6 +254,9 @@ def test_udev_rule_names_the_bridge_and_its_unit(prefix):
         assert items["ENV{SYSTEMD_WANTS}+="] == "whiskerd.service"
         assert 'TAG+="uaccess"' in rule and items["GROUP="] == "whisker" and items["MODE="] == "0660"
     assert len(rules) == 1
+    metainfo = ElementTree.parse(prefix / "share/metainfo/org.example.crunchbot.whiskerd.metainfo.xml")
+    ids = f"v{LIMITS['usb_vendor_id']:04X}p{LIMITS['usb_product_id']:04X}"
+    assert metainfo.findtext("provides/modalias") == f"usb:{ids}d*"
     if "verify" in subprocess.run([tool("udevadm"), "--help"], capture_output=True, text=True).stdout:
         run("udevadm", "verify", prefix / "lib/udev/rules.d/70-whisker.rules")
 
