@@ -33,7 +33,7 @@ COMMANDS = {
     "pilot": "the netbook's part of a robot: samples to wheel speeds and observations",
     "navigator": "pose and belief of a robot as its rows come, over the network",
     "mapper": "map and pose of a robot in an unknown arena as its rows come, over the network",
-    "ros2": "a running robot as a node of ROS 2 by rmw_zenoh, without ROS: standard messages, frames, /initialpose",
+    "ros2": "a running robot as a node of ROS 2, by Zenoh or Cyclone DDS, without ROS: standard messages, frames, /initialpose",
     "foxglove": "a running robot in Foxglove: pose, belief, whiskers, map, health; a pose set there is obeyed",
     "bag": "record everything a robot's processes say, for ROS 2 tools",
     "pyro": "a robot's results as a Pyro object, the paper's interface",
@@ -52,6 +52,7 @@ EXTRAS = {
     **{name: name for name in ("export", "ros2", "foxglove")},
     **dict.fromkeys(("localise", "map", "calibrate", "scene"), "scenes"),
 }
+PACKAGE_EXTRAS = {"cyclonedds": "cyclonedds"}  # of a package that only one way of a command needs
 LAB_COMMANDS = ("bridge-sim", "scene", "bench")  # of the package crunchbot_lab
 
 
@@ -63,10 +64,11 @@ def _run(words: list[str]) -> int:
     try:
         return _run_command(words)
     except ModuleNotFoundError as error:
-        command = next(iter(words), "")
-        if command not in EXTRAS or (error.name or "").startswith("crunchbot"):
+        command, package = next(iter(words), ""), (error.name or "").partition(".")[0]
+        if command not in EXTRAS or package.startswith("crunchbot"):
             raise
-        text = f"{command}: needs the package {error.name}; run: pip install 'crunchbot[{EXTRAS[command]}]'"
+        extra = PACKAGE_EXTRAS.get(package, EXTRAS[command])
+        text = f"{command}: needs the package {package}; run: pip install 'crunchbot[{extra}]'"
         raise UserError(text) from error
 
 

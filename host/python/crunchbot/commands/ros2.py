@@ -2,41 +2,75 @@
 
 import argparse
 import os
-import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .. import scene as scenes
-from ..arguments import whole_number
+from ..arguments import warn, whole_number
+from ..errors import UserError
 from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
-from ..robot.ros2 import ROUTER, RosNode
+from ..robot.ros2 import LOCALHOST, ROUTER, SUBNET
 from ..robot.standard.view import StandardView
 from ..stopping import stop_on_signals
 
+if TYPE_CHECKING:
+    from ..robot.standard.outlet import Outlet
+
 EXAMPLE = "whisker ros2 robot-run/scene"
 DOMAIN_VARIABLE, DOMAIN_MOST = "ROS_DOMAIN_ID", 232
+ZENOH, CYCLONE = "zenoh", "cyclonedds"
+RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE", help="the robot's scene folder")
+    text = "which implementation of ROS 2's middleware reads it (default: %(default)s)"
+    parser.add_argument("--rmw", choices=(ZENOH, CYCLONE), default=ZENOH, help=text)
     domain = os.environ.get(DOMAIN_VARIABLE) or "0"
     text = f"of ROS 2 (default: {DOMAIN_VARIABLE}, or 0)"
     parser.add_argument("--domain", type=whole_number(0, DOMAIN_MOST), default=domain, metavar="N", help=text)
-    text = "of rmw_zenoh, tcp/HOST:PORT (default: %(default)s)"
-    parser.add_argument("--router", default=ROUTER, metavar="ENDPOINT", help=text)
+    text = f"of rmw_zenoh, tcp/HOST:PORT (default: {ROUTER})"
+    parser.add_argument("--router", metavar="ENDPOINT", help=text)
+    text = f"who finds it by Cyclone DDS: this machine, or its networks (default: {RANGE_VARIABLE}, or {LOCALHOST})"
+    parser.add_argument("--range", choices=(LOCALHOST, SUBNET), help=text)
     add_link(parser, [], [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT])
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
+    open_node = {ZENOH: _zenoh_node, CYCLONE: _cyclone_node}[arguments.rmw]
+    foreign = {ZENOH: "range", CYCLONE: "router"}[arguments.rmw]
+    if getattr(arguments, foreign) is not None:
+        raise UserError(f"--{foreign}: --rmw {arguments.rmw} has none; leave it out, or choose the other --rmw")
     view = StandardView(scenes.load(arguments.scene), time.time_ns())
     stop = stop_on_signals()
     with open_link("ros2", arguments) as link:
-        node = RosNode(view, arguments.robot, arguments.domain, arguments.router)
-        print(f"node {node.name} in domain {arguments.domain}, by {arguments.router}", flush=True)
-        if not node.has_router():
-            text = f"{arguments.router}: no router answers yet; start one: ros2 run rmw_zenoh_cpp rmw_zenohd"
-            print(f"whisker: warning: {text}", file=sys.stderr, flush=True)
+        node = open_node(view, arguments)
         node.run(link, stop)
     print(f"{node.sent} messages, {node.poses_set} poses set, {node.poses_refused} refused")
     return 0
+
+
+def _zenoh_node(view: StandardView, arguments: argparse.Namespace) -> "Outlet":
+    from ..robot.ros2.rmw_zenoh import ZenohNode
+
+    router = arguments.router or ROUTER
+    node = ZenohNode(view, arguments.robot, arguments.domain, router)
+    print(f"node {node.name} in domain {arguments.domain}, by {router}", flush=True)
+    if not node.has_router():
+        warn(f"{router}: no router answers yet; start one: ros2 run rmw_zenoh_cpp rmw_zenohd")
+    return node
+
+
+def _cyclone_node(view: StandardView, arguments: argparse.Namespace) -> "Outlet":
+    reach = arguments.range or (os.environ.get(RANGE_VARIABLE) or LOCALHOST).lower()
+    if reach not in (LOCALHOST, SUBNET):
+        raise UserError(f"{RANGE_VARIABLE}: '{reach}' is not served; give --range {LOCALHOST} or {SUBNET}")
+    from ..robot.ros2.rmw_cyclonedds import CycloneNode
+
+    node = CycloneNode(view, arguments.robot, arguments.domain, reach)
+    print(f"node {node.name} in domain {arguments.domain}, by Cyclone DDS, range {reach}", flush=True)
+    if reach != LOCALHOST:
+        warn("anyone in the domain on this machine's networks can watch, and set the pose")
+    return node

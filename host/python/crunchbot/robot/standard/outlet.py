@@ -13,6 +13,7 @@ from . import types
 from .view import KINDS, LATCHED, POSE_TOPIC, Standard, StandardView
 
 LOOK_S = 0.2
+STAMP = slice(4, 12)  # of a header that begins a message, behind the four bytes that begin its CDR
 
 
 class Outlet:
@@ -40,6 +41,9 @@ class Outlet:
         """Publishes CDR, which is made only where somebody takes it. False: nobody does."""
         raise NotImplementedError
 
+    def look(self) -> None:
+        """Between messages, at least every LOOK_S: for what does not come by a thread of its own."""
+
     def warn(self, text: str) -> None:
         """A line to the person who asked for something impossible."""
 
@@ -61,6 +65,7 @@ class Outlet:
             for received in inbox.take(LOOK_S):
                 if not received.over:
                     self._take(received.topic, received.message)
+            self.look()
             while not self._tasks.empty():
                 self._tasks.get()(link)
             health.report(0, RUNNING, inbox.last_error)
@@ -78,7 +83,9 @@ class Outlet:
 
     def _set_pose(self, link: Link, read: Callable[[], bytes]) -> None:
         try:
-            initial_pose.send_message(link, decode(PoseWithCovarianceStamped, read(), POSE_TOPIC))
+            cdr = bytearray(read())
+            cdr[STAMP] = bytes(8)  # it is of a clock that the navigator does not know; the pose is of now
+            initial_pose.send_message(link, decode(PoseWithCovarianceStamped, bytes(cdr), POSE_TOPIC))
             self.poses_set += 1
         except (MessageError, Malformed, ValueError) as error:
             self.poses_refused += 1

@@ -11,6 +11,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 EMPTY = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}
+OCTETS = ("byte", "char")  # as NumPy names neither
 
 
 @cache
@@ -70,4 +71,4 @@ def _empty(node: Nodetype, detail):
     (inner, kind), length = detail
     if inner is Nodetype.NAME or kind[0] == "string":
         return []
-    return np.zeros(length, np.dtype(kind[0]))
+    return np.zeros(length, np.uint8 if kind[0] in OCTETS else np.dtype(kind[0]))

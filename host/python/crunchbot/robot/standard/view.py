@@ -42,6 +42,7 @@ KINDS = {
 }
 LATCHED = ("/map",)  # a subscriber that comes late gets the last one
 POSE_TOPIC, POSE_KIND = "/initialpose", "geometry_msgs/PoseWithCovarianceStamped"  # obeyed
+POSE_SCHEMA = POSE_KIND.replace("/", "/msg/")
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,8 @@ from zenoh.ext import HistoryConfig, declare_advanced_subscriber
 from crunchbot.recording.types import store as own_types
 from crunchbot.robot.network import messages as m
 from crunchbot.robot.network.link import Link
-from crunchbot.robot.ros2 import PUBLISHER, SUBSCRIPTION, Graph, publisher_id, ros_name
+from crunchbot.robot.ros2.names import ros_name
+from crunchbot.robot.ros2.rmw_zenoh import PUBLISHER, SUBSCRIPTION, Graph, publisher_id
 from crunchbot.robot.standard import shapes, types
 from crunchbot.robot.standard.view import KINDS, POSE_KIND
 from crunchbot.scene import write
@@ -168,7 +169,9 @@ def test_a_program_of_ros_reads_the_robot_and_sets_its_pose(tmp_path):
                 assert samples[0].key_expr == f"0/{topic}/{dds_name(kind)}/{types.type_hash(kind)}"
                 assert types.decode(kind, samples[0].payload.to_bytes())
         desk.session.put(POSE_KEY, b"?")
-        desk.session.put(POSE_KEY, POSE)
+        desk.session.put(
+            POSE_KEY, POSE[:4] + struct.pack("<iI", int(time.time()), 5) + POSE[12:]
+        )  # stamped, as RViz does
         while (received := inbox.take(30.0)) and received[0].over:
             continue
         assert received[0].message.pose.pose.xytheta == pytest.approx((1.25, 0.75, 0.0))

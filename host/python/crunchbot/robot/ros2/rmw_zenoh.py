@@ -1,4 +1,4 @@
-"""A running robot as a node of ROS 2, without ROS: its standard messages, and its own, as rmw_zenoh publishes them.
+"""A running robot as a node of ROS 2: its standard messages, and its own, as rmw_zenoh publishes them.
 
 rmw_zenoh's design document and sources describe what is on the wire. A message goes to the key domain/topic/type/hash,
 as CDR; its attachment is number, wall time and publisher, in zenoh's serialization. A liveliness token makes a node, a
@@ -6,7 +6,6 @@ publisher or a subscription known; its 128-bit XXH3 is the publisher's id.
 """
 
 import json
-import re
 import sys
 import time
 from collections.abc import Callable
@@ -17,13 +16,12 @@ import xxhash
 import zenoh
 from zenoh.ext import CacheConfig, Int64, MissDetectionConfig, declare_advanced_publisher, z_serialize
 
-from ..recording.types import store as own_types
-from .network.link import ENDPOINT, RETRY, NamingError
-from .standard import types
-from .standard.outlet import Outlet
-from .standard.view import LATCHED, POSE_KIND, POSE_TOPIC, StandardView
+from ..network.link import ENDPOINT, RETRY, NamingError
+from ..standard.outlet import Outlet
+from ..standard.view import LATCHED, POSE_SCHEMA, POSE_TOPIC, StandardView
+from . import ROUTER
+from .names import dds_name, hash_of, node_name, ros_name
 
-ROUTER = "tcp/localhost:7447"  # where rmw_zenohd listens
 ROUTER_S = 2.0  # in which a router that runs has answered
 # What follows "reliable, volatile, the last N": deadline, lifespan and liveliness are the standard ones. The map is kept.
 QOS = {False: "::,10:,:,:,,", True: ":1:,1:,:,:,,"}
@@ -41,14 +39,14 @@ class Graph:
 
     def key(self, topic: str, schema: str) -> str:
         """Of a topic's messages, of type "package/msg/Type"."""
-        return f"{self.domain}/{topic.strip('/')}/{_dds_name(schema)}/{_hash_of(schema)}"
+        return f"{self.domain}/{topic.strip('/')}/{dds_name(schema)}/{hash_of(schema)}"
 
     def node_token(self) -> str:
         return self._token(0, NODE)
 
     def token(self, number: int, kind: str, topic: str, schema: str) -> str:
         """Of a publisher or subscription, the node's `number`-th."""
-        what = f"{topic.replace('/', '%')}/{_dds_name(schema)}/{_hash_of(schema)}"
+        what = f"{topic.replace('/', '%')}/{dds_name(schema)}/{hash_of(schema)}"
         return f"{self._token(number, kind)}/{what}/{QOS[topic in LATCHED]}"
 
     def _token(self, number: int, kind: str) -> str:
@@ -58,21 +56,6 @@ class Graph:
 def publisher_id(token: str) -> bytes:
     """16 bytes: lower half first, each little-endian."""
     return xxhash.xxh3_128_intdigest(token.encode()).to_bytes(16, "little")
-
-
-def ros_name(topic: str) -> str:
-    """A topic with what ROS does not allow replaced: letters, digits and underscore remain, and a digit leads nothing."""
-    return re.sub(r"(?<=/)(?=\d)", "_", re.sub(r"[^\w/]", "_", topic, flags=re.ASCII))
-
-
-def _dds_name(schema: str) -> str:
-    package, _, kind = schema.split("/")
-    return f"{package}::msg::dds_::{kind}_"
-
-
-def _hash_of(schema: str) -> str:
-    own = schema in own_types().fielddefs
-    return own_types().hash_rihs01(schema) if own else types.type_hash(schema)
 
 
 class Topic:
@@ -102,20 +85,19 @@ class Topic:
         return True
 
 
-class RosNode(Outlet):
+class ZenohNode(Outlet):
     """The node crunchbot_<robot>. NamingError: `router` is no endpoint."""
 
     def __init__(self, view: StandardView, robot: str, domain: int, router: str):
         super().__init__(view, robot)
         self._session = zenoh.open(_config(router))
-        self.name = ros_name(f"crunchbot_{robot}")
+        self.name = node_name(robot)
         self._graph = Graph(domain, str(self._session.zid()), self.name)
         self._topics: dict[str, Topic] = {}
         self._kept = [self._session.liveliness().declare_token(self._graph.node_token())]
         self.open_all()
-        schema = POSE_KIND.replace("/", "/msg/")
-        self._kept.append(self._session.declare_subscriber(self._graph.key(POSE_TOPIC, schema), self._posed))
-        token = self._graph.token(len(self._topics) + 1, SUBSCRIPTION, POSE_TOPIC, schema)
+        self._kept.append(self._session.declare_subscriber(self._graph.key(POSE_TOPIC, POSE_SCHEMA), self._posed))
+        token = self._graph.token(len(self._topics) + 1, SUBSCRIPTION, POSE_TOPIC, POSE_SCHEMA)
         self._kept.append(self._session.liveliness().declare_token(token))
 
     def has_router(self) -> bool:
