@@ -84,7 +84,7 @@ def keys(value) -> set[str]:
 def folder(tmp_path_factory) -> Path:
     """A scene folder with everything that one can hold."""
     path = tmp_path_factory.mktemp("scene")
-    made = scenes.make("anchor+normals", 1, 40)
+    made = scenes.make("anchor+normals+gyro", 1, 40)
     arena, robot = made.scene.arena, made.scene.robot
     box = arena.obstacles[0]
     arena = dataclasses.replace(arena, wall=arena.textures[0], surfaces=((box, arena.textures[0]),))
