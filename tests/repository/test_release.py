@@ -1,5 +1,6 @@
 """What a release says of itself: versions, citation, licences, the forges' files."""
 
+import importlib.util
 import re
 
 import pytest
@@ -71,3 +72,17 @@ def test_the_debian_packages_are_of_this_version_and_all_are_built():
         "libwhisker-dev",
         *(f"libwhisker{part}{soname}" for part in ("", "-nav", "-create")),
     }
+
+
+def test_the_second_of_two_releases_copies_no_run_of_the_first(monkeypatch):
+    """The tools of the bitstreams keep their runs; a comparison with a copy would always find the same bytes."""
+    spec = importlib.util.spec_from_file_location("release", ROOT / "tools/release/__main__.py")
+    release = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(release)
+    kept = []
+    monkeypatch.setenv(release.kept_runs.VARIABLE, "")
+    monkeypatch.setattr(release, "make", lambda *_: kept.append(release.kept_runs.cache_folder()) or "0  a\n")
+    monkeypatch.setattr(release.sys, "argv", ["release", "--twice", "--boards", "ulx3s"])
+    assert release.main() == 0
+    first, second = kept
+    assert first != second and not first.is_relative_to(second) and not second.exists()
