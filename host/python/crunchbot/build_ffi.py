@@ -52,6 +52,7 @@ HEADERS = {
             "filter/weigh.h",
             "mapping/mapper.h",
             "planning/planner.h",
+            "mapping/grid/grid_mapper.h",
         )
     ],
     "whisker": [

@@ -5,6 +5,7 @@ import json
 
 from ..arguments import whole_number
 from ..nav import mapping
+from ..nav.grid_mapper import GridMapper
 from ..nav.mapper import PARTICLES_MOST, SEED_MOST, default_particles
 
 EXAMPLE = "whisker map examples/scene --out touched --json"
@@ -18,9 +19,15 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--particles",
         type=whole_number(1, PARTICLES_MOST),
-        default=default_particles(),
         metavar="N",
-        help="hypotheses held at a time (default: %(default)s)",
+        help=f"hypotheses held at a time (default: {default_particles()}; {default_particles(GridMapper)} for grid)",
+    )
+    parser.add_argument(
+        "--representation",
+        choices=mapping.REPRESENTATIONS,
+        default="faces",
+        help="what the map is made of: straight faces and tiles; cells, a path a particle; or faces in a factor graph "
+        "of GTSAM, an extra (default: %(default)s)",
     )
     parser.add_argument(
         "--seed", type=whole_number(0, SEED_MOST), default=0, help="of every draw (default: %(default)s)"
@@ -33,7 +40,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     robot, textures, rows = mapping.read(arguments.scene)
     lattice = not arguments.no_lattice
-    mapped = mapping.run(robot, textures, rows, arguments.seed, arguments.particles, lattice, arguments.json)
+    options = (arguments.seed, arguments.particles, lattice, arguments.json, arguments.representation)
+    mapped = mapping.run(robot, textures, rows, *options)
     reported = mapping.summary(mapped, mapping.write_map(arguments.out, mapped))
     print(json.dumps(reported) if arguments.json else "\n".join(f"{key}: {value}" for key, value in reported.items()))
     return 0

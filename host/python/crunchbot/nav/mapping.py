@@ -11,6 +11,8 @@ from ..progress import bar
 from ..scene import OBSERVATIONS, Arena, Prior, Robot, Scene, load_robot, write
 from ..tables import TableError, read_rows, unwritable
 from .filters import ESTIMATE
+from .grid_mapper import GridMapper
+from .map_graph import GraphMapper
 from .map_scene import CELL_M, MapScene, map_scene
 from .mapper import PATCH_M, Mapper, TouchMap
 from .observations import Observations, read_observations
@@ -18,6 +20,11 @@ from .observations import Observations, read_observations
 CHUNK = 100  # rows between two steps of the progress bar
 FACES, TILES, ESTIMATES, IMAGE, MAP = "faces.csv", "tiles.csv", "est.csv", "map.png", "map.yaml"
 START_SIGMA = (0.02, 0.02, 0.03)  # of the first pose in prior.toml: m, m, rad
+REPRESENTATIONS: dict[str, type[Mapper] | type[GraphMapper]] = {
+    "faces": Mapper,
+    "grid": GridMapper,
+    "graph": GraphMapper,
+}
 GREYS = {FREE: 254, SOLID: 0}  # of ROS; any other cell is 205
 GREY_UNKNOWN = 205
 
@@ -74,9 +81,11 @@ def run(
     particles: int | None = None,
     lattice: bool = True,
     quiet: bool = True,
+    representation: str = "faces",
 ) -> Mapped:
-    """Map all rows. MappingError when an option is out of range."""
-    mapper = Mapper(robot, textures, seed, particles, lattice, rows.normal is not None)
+    """Map all rows, by one of REPRESENTATIONS. MappingError when an option is out of range."""
+    kind = REPRESENTATIONS[representation]
+    mapper = kind(robot, textures, seed, particles, lattice, rows.normal is not None)
     parts = [(np.zeros(0, ESTIMATE), np.zeros(0))]
     for first in bar(range(0, len(rows), CHUNK), disable=quiet, unit_scale=CHUNK, unit="rows", desc="map"):
         parts.append(mapper.replay(rows, first, min(CHUNK, len(rows) - first)))

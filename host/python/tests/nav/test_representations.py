@@ -1,0 +1,75 @@
+"""Other representations of a map by touch: grid maps and the factor graph, by their options, errors and figures."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from crunchbot import cli
+from crunchbot.nav import mapping
+from crunchbot.nav.grid_mapper import GridMapper
+from crunchbot.nav.map_graph import Borders, GraphMapper
+from crunchbot.nav.mapper import MappingError
+from crunchbot_lab.scenes import map_scoring, write_scene
+from crunchbot_lab.scenes.making import make
+
+ROWS = 2000
+
+
+@pytest.fixture(scope="module")
+def made():
+    return make("anchor", 13, ROWS)
+
+
+@pytest.mark.parametrize("representation", ["grid", "graph"])
+def test_a_representation_maps_better_than_odometry(made, representation):
+    if representation == "graph":
+        pytest.importorskip("gtsam")
+    textures = made.scene.arena.textures
+    run = mapping.run(made.scene.robot, textures, made.observations, representation=representation)
+    score = map_scoring.score(run, made.scene.arena)
+    assert len(run.table) == len(run.step_us) == ROWS
+    assert np.isfinite(run.table["pose"]).all() and np.isfinite(run.table["covariance"]).all()
+    assert len(run.touched.faces) > 3
+    assert score["error_median_m"] < score["odometry_error_median_m"]
+    assert run.scene().arena.obstacles
+
+
+def test_the_grid_of_cells_is_free_inside_and_solid_at_walls(made):
+    mapper = GridMapper(made.scene.robot, made.scene.arena.textures)
+    mapper.replay(made.observations, 0, ROWS)
+    grid = mapper.map().grid
+    assert grid.cell == 0.025
+    assert 0.0 <= grid.occupied.min() < 0.05 and 0.6 < grid.occupied.max() <= 1.0
+    assert (grid.occupied > 0.5).sum() < 0.1 * (grid.occupied < 0.5).sum()
+    assert mapper.evidence != 0.0
+
+
+def test_options_out_of_range_are_one_line(made):
+    robot, textures = made.scene.robot, made.scene.arena.textures
+    with pytest.raises(MappingError, match="^--particles 5001: outside 1 to 5000; choose a number inside$"):
+        GridMapper(robot, textures, particles=5001)
+
+
+def test_a_graph_without_its_package_is_one_line(made, monkeypatch, tmp_path, capsys):
+    monkeypatch.setitem(sys.modules, "gtsam", None)
+    with pytest.raises(MappingError, match="crunchbot.graph"):
+        GraphMapper(made.scene.robot, made.scene.arena.textures)
+    write_scene(tmp_path / "scene", made.scene, made.observations)
+    words = ["map", str(tmp_path / "scene"), "--out", str(tmp_path / "map"), "--representation", "graph"]
+    assert cli.main(words) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "gtsam" in error and "pip install" in error
+
+
+def test_a_change_of_texture_is_a_border_where_it_was_crossed(made):
+    borders = Borders(made.scene.robot, 2)
+    sure, other = np.array([[0.0, -3.0]] * 2), np.array([[-3.0, 0.0]] * 2)
+    found = []
+    for k in range(60):
+        found += [(k, *point) for point in borders.take(np.array([0.02, 0.0, 0.0]), sure if k < 30 else other)]
+    tip = made.scene.robot.of_role("texture")[0].tip_m
+    assert len(found) == 2
+    row, x, _ = found[0]
+    assert 30 <= row <= 33
+    assert abs(x - (tip[0] - 0.02 * (row - 29.5))) < 0.03
