@@ -1,6 +1,7 @@
 """The site's parts: docstrings and headers' comments are taken over whole, links are followed. `make docs` builds all of it."""
 
 import importlib
+import json
 import shutil
 import subprocess
 import sys
@@ -82,3 +83,18 @@ def test_every_exported_function_is_in_the_reference_of_c(tmp_path):
         exported |= {line.split()[2] for line in listed.splitlines() if line.split()[1] == "T"}
     assert len(exported) > 100 and exported <= named
     assert len(exported & documented) > 0.6 * len(exported), "a comment may stand for several functions below it"
+
+
+def test_an_address_that_is_not_reached_is_named_and_a_missing_network_is_one_line(tmp_path):
+    def report(**status: str) -> list[str]:
+        lines = [
+            {"filename": "a.md", "lineno": 7, "uri": f"https://{name}", "status": found, "info": "404"}
+            for name, found in status.items()
+        ]
+        (tmp_path / "output.json").write_text("".join(json.dumps(line) + "\n" for line in lines))
+        return links.unreached(tmp_path / "output.json")
+
+    assert report(one="working", two="redirected") == []
+    assert report(one="working", two="broken") == ["a.md:7: https://two: 404"]
+    (line,) = report(one="broken", two="timeout")
+    assert "none of 2 addresses" in line and "EXTERNAL=1" in line

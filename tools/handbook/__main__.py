@@ -10,8 +10,9 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
-from .links import broken
+from .links import broken, unreached
 from .reference import write_reference
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,30 +33,27 @@ def main(argv: list[str] | None = None) -> int:
     stage(source)
     headers = read_headers(options.build_dir, options.out)
     write_reference(source / "api", headers)
-    for builder, out in [("html", html), *([("linkcheck", options.out / "external")] if options.external else [])]:
-        words = [
-            "-b",
-            builder,
-            "-c",
-            HERE,
-            "-W",
-            "--keep-going",
-            "-q",
-            "-j",
-            "2",
-            "-d",
-            options.out / "trees",
-            source,
-            out,
-        ]
-        code = subprocess.run(
-            [sys.executable, "-m", "sphinx", *words], check=False, env=environment(options.out)
-        ).returncode
-        if code:
-            return 1
+    if run_sphinx("html", source, html, options.out).returncode:
+        return 1
     complaints = broken(html)
+    if options.external:
+        run_sphinx(
+            "linkcheck",
+            source,
+            options.out / "external",
+            options.out,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.STDOUT,
+        )
+        complaints += unreached(options.out / "external/output.json")
     print("\n".join(complaints) or f"handbook: {len(list(html.rglob('*.html')))} pages: {html / 'index.html'}")
     return 1 if complaints else 0
+
+
+def run_sphinx(builder: str, source: Path, out: Path, place: Path, **options: Any) -> subprocess.CompletedProcess:
+    """place: where the site is made, and what all builders share."""
+    words = ["-b", builder, "-c", HERE, "-W", "--keep-going", "-q", "-j", "2", "-d", place / "trees", source, out]
+    return subprocess.run([sys.executable, "-m", "sphinx", *words], check=False, env=environment(place), **options)
 
 
 def environment(out: Path) -> dict[str, str]:

@@ -1,5 +1,6 @@
 """Links within built pages: each leads to a file that is there, and to a place in it that is there."""
 
+import json
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -36,3 +37,16 @@ def broken(html: Path) -> list[str]:
             elif place and target in pages and place not in pages[target].places:
                 found.append(f"{path.relative_to(html.resolve())}: {link}: there is no such place")
     return sorted(set(found))
+
+
+def unreached(report: Path) -> list[str]:
+    """A line for each address outside that Sphinx's linkcheck, whose output.json this is, did not reach; one line where it
+    reached none, for then the pages are not what is wrong."""
+    tried = [json.loads(line) for line in report.read_text().splitlines()]
+    outside = [one for one in tried if one["uri"].startswith("http")]
+    lost = [one for one in outside if one["status"] in ("broken", "timeout")]
+    if outside and len(lost) == len(outside):
+        return [
+            f"handbook: none of {len(outside)} addresses outside is reached; look at the network, or leave out EXTERNAL=1"
+        ]
+    return sorted({f"{one['filename']}:{one['lineno']}: {one['uri']}: {one['info']}" for one in lost})
