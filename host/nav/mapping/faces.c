@@ -10,14 +10,40 @@ static const double EDGE_M = 0.006;                    /* over which noticing a 
 static const double PASSED = 0.95;                     /* probability that a whisker went through a face */
 static const double GONE = 3.0, GONE_SHARE = 0.5;      /* passages that remove a face, beside so many of its contacts */
 static const double HITS_MOST = 20.0;                  /* contacts that count against passages */
+static const double THROUGH = 0.5;                     /* a row in which the body stands in a face, without it */
+static const double AWAY_M = 1.0, GROWN_M = 0.01;      /* a way without a face, how uncertain it is then: a closure */
+static const double CONFIRMED = 5.0, DOUBT = 0.01;     /* contacts that confirm it; least doubt of each */
 static const double CORNER_M = 0.03, PLACE_MOST = 0.3; /* m from a face's end; m of the pose: no passage is counted */
 
 void nav_faces_begin(struct nav_faces *f)
 {
+    f->row = 0;
+    f->way = 0.0;
+    f->noted = -1;
     f->count = 0;
     f->loose = 0;
     f->right = 1.0;
     f->refused = 1.0;
+}
+
+void nav_faces_feel(struct nav_faces *f, struct nav_face *g, struct nav_touch point, double known, double probability,
+                    double contacts)
+{
+    struct nav_sighting now = {f->row, f->way, point.x, point.y};
+    double doubt = fmax(1.0 - probability, DOUBT);
+    if (f->way - g->seen.way > AWAY_M) {
+        g->waits = known > GROWN_M ? CONFIRMED : 0.0;
+        g->open = (struct nav_closure){now, g->seen, 0.0};
+    }
+    g->seen = now;
+    if (!(g->waits > 0.0))
+        return;
+    g->open.probability = 1.0 - (1.0 - g->open.probability) * doubt;
+    g->waits -= contacts;
+    if (g->waits > 0.0)
+        return;
+    f->closure = g->open;
+    f->noted = f->row;
 }
 
 static double faces_fresh(const struct nav_contact *c)
@@ -27,7 +53,7 @@ static double faces_fresh(const struct nav_contact *c)
 
 /* The face that a contact is most likely of; -1: none known to `sharp` m explains it. *total: its likelihood, 1 / m. */
 static int faces_choose(const struct nav_faces *f, const struct nav_joint *j, const struct nav_touch *t, double sigma,
-                        double fresh, double sharp, double *total)
+                        double fresh, double sharp, double *total, double *most)
 {
     struct nav_face_view view;
     double best = 0.0, all = 0.0;
@@ -43,6 +69,7 @@ static int faces_choose(const struct nav_faces *f, const struct nav_joint *j, co
         }
     }
     *total = all + fresh;
+    *most = best;
     return all > CLEAR * fresh ? chosen : -1;
 }
 
@@ -60,11 +87,13 @@ static void faces_apply_normal(struct nav_face *g, struct nav_joint *j, const st
         nav_joint_measure(j, &form, -off, noise);
 }
 
-static void faces_apply(struct nav_face *g, struct nav_joint *j, const struct nav_touch *t, double sigma)
+static void faces_apply(struct nav_faces *f, struct nav_face *g, struct nav_joint *j, const struct nav_touch *t,
+                        double sigma, double probability)
 {
     struct nav_face_view view;
     if (!nav_face_look(g, j, t, &view))
         return;
+    nav_faces_feel(f, g, *t, sqrt(fmax(view.variance, 0.0)), probability, 1.0);
     nav_joint_measure(j, &view.form, -view.off, nav_face_noise(&view, sigma));
     faces_apply_normal(g, j, t);
     nav_face_feel(g, view.along, view.along);
@@ -76,11 +105,11 @@ double nav_faces_take(struct nav_faces *f, struct nav_joint *j, const struct nav
                       const struct nav_contact *contact)
 {
     const struct nav_touch *t = &touches->touch[contact->place];
-    double total;
+    double total, most;
     f->loose &= ~(1ULL << contact->place);
-    int chosen = faces_choose(f, j, t, contact->sigma, faces_fresh(contact), SHARP_M, &total);
+    int chosen = faces_choose(f, j, t, contact->sigma, faces_fresh(contact), SHARP_M, &total, &most);
     if (chosen >= 0) {
-        faces_apply(&f->face[chosen], j, t, contact->sigma);
+        faces_apply(f, &f->face[chosen], j, t, contact->sigma, most / total);
         return log(total * contact->length);
     }
     f->loose |= 1ULL << contact->place;
@@ -114,12 +143,12 @@ double nav_faces_miss(struct nav_faces *f, struct nav_joint *j, const struct nav
 double nav_faces_apart(const struct nav_faces *f, const struct nav_joint *j, const struct nav_touches *touches,
                        uint64_t among, const struct nav_contact *contact)
 {
-    double fresh = faces_fresh(contact), total, sum = 0.0;
+    double fresh = faces_fresh(contact), total, most, sum = 0.0;
     for (int place = 0; place < NAV_TOUCHES_MOST; place++) {
         if (!(among >> place & 1))
             continue;
         const struct nav_touch *t = &touches->touch[place];
-        (void)faces_choose(f, j, t, sqrt(t->variance), fresh, INFINITY, &total);
+        (void)faces_choose(f, j, t, sqrt(t->variance), fresh, INFINITY, &total, &most);
         sum += log(fmax((total - fresh) * contact->length / NAV_FACES_LOOSE, 1.0));
     }
     return sum;
@@ -128,16 +157,17 @@ double nav_faces_apart(const struct nav_faces *f, const struct nav_joint *j, con
 double nav_faces_drain(struct nav_faces *f, struct nav_joint *j, const struct nav_touches *touches, uint64_t among,
                        const struct nav_contact *contact, bool all)
 {
-    double total, sum = 0.0;
+    double total, most, sum = 0.0;
     for (int place = 0; place < NAV_TOUCHES_MOST; place++) {
         const struct nav_touch *t = &touches->touch[place];
         if (!(f->loose & among & touches->held & 1ULL << place))
             continue;
         double sigma = sqrt(t->variance);
-        int chosen = faces_choose(f, j, t, sigma, faces_fresh(contact), all ? (double)INFINITY : SHARP_M, &total);
+        int chosen =
+            faces_choose(f, j, t, sigma, faces_fresh(contact), all ? (double)INFINITY : SHARP_M, &total, &most);
         if (chosen < 0)
             continue;
-        faces_apply(&f->face[chosen], j, t, sigma);
+        faces_apply(f, &f->face[chosen], j, t, sigma, most / total);
         f->loose &= ~(1ULL << place);
         sum += log(total * contact->length / NAV_FACES_LOOSE);
     }
@@ -169,8 +199,9 @@ static bool faces_gone(const struct nav_face *g)
     return g->missed > GONE + GONE_SHARE * fmin(g->hits, HITS_MOST);
 }
 
-void nav_faces_stand(struct nav_faces *f, struct nav_joint *j, double radius)
+double nav_faces_stand(struct nav_faces *f, struct nav_joint *j, double radius)
 {
+    double sum = 0.0;
     double margin = faces_margin(j), x = j->mean[NAV_JOINT_X], y = j->mean[NAV_JOINT_Y];
     for (int n = f->count - 1; n >= 0; n--) {
         struct nav_face *g = &f->face[n];
@@ -178,9 +209,11 @@ void nav_faces_stand(struct nav_faces *f, struct nav_joint *j, double radius)
         double off = nx * dx + ny * dy - j->mean[g->index + 1];
         bool through = fabs(off) < radius - margin && nav_face_felt(g, nx * dy - ny * dx, 0.0);
         g->missed += through;
+        sum += through ? log(THROUGH) : 0.0;
         if (through && faces_gone(g))
             faces_drop(f, j, n);
     }
+    return sum;
 }
 
 void nav_faces_review(struct nav_faces *f, struct nav_joint *j)

@@ -9,8 +9,12 @@ enum { NAV_FACES_MOST = 64 };
 struct nav_faces {
     int count;
     struct nav_face face[NAV_FACES_MOST];
-    uint64_t loose;        /* a bit for each touch that belongs to no face yet */
-    double right, refused; /* faces at right angles and others, as counted, the prior's included */
+    uint64_t loose;             /* a bit for each touch that belongs to no face yet */
+    double right, refused;      /* faces at right angles and others, as counted, the prior's included */
+    long row;                   /* that is being taken */
+    double way;                 /* m that the robot has gone */
+    struct nav_closure closure; /* the last one, as of `noted` */
+    long noted;
 };
 
 /* A contact as a whisker reports it. */
@@ -31,8 +35,8 @@ double nav_faces_take(struct nav_faces *, struct nav_joint *, const struct nav_t
  * end, whose direction is the whisker's. Returns the log-likelihood. */
 double nav_faces_miss(struct nav_faces *, struct nav_joint *, const struct nav_touch *end, double length, double miss);
 
-/* Takes that the robot's body stands where it stands: no face goes through it. */
-void nav_faces_stand(struct nav_faces *, struct nav_joint *, double radius);
+/* Takes that the robot's body stands where it stands: no face goes through it. Returns the log-likelihood. */
+double nav_faces_stand(struct nav_faces *, struct nav_joint *, double radius);
 
 /* Log-likelihood of loose contacts as each of some face of the map, over all of them as of none. */
 double nav_faces_apart(const struct nav_faces *, const struct nav_joint *, const struct nav_touches *, uint64_t among,
@@ -42,6 +46,11 @@ double nav_faces_apart(const struct nav_faces *, const struct nav_joint *, const
  * this adds. */
 double nav_faces_drain(struct nav_faces *, struct nav_joint *, const struct nav_touches *, uint64_t among,
                        const struct nav_contact *, bool all);
+
+/* Notes that a face was felt at a point of the robot's frame. known: m, how well its distance was known before;
+ * contacts: how many it is worth. */
+void nav_faces_feel(struct nav_faces *, struct nav_face *, struct nav_touch point, double known, double probability,
+                    double contacts);
 
 /* Makes one face of two that are the same, and removes those that whiskers went through. */
 void nav_faces_review(struct nav_faces *, struct nav_joint *);

@@ -123,6 +123,14 @@ static double floor_agree(struct nav_floor *f, double log_likelihood)
     return log_likelihood;
 }
 
+void nav_floor_at(const struct nav_floor *f, const struct nav_joint *j, double x, double y, int *column, int *row)
+{
+    struct floor_view v;
+    floor_look(f, j, x, y, &v);
+    *column = v.column;
+    *row = v.row;
+}
+
 double nav_floor_take(struct nav_floor *f, struct nav_joint *j, double x, double y, const float *ratio)
 {
     struct floor_view v;

@@ -28,6 +28,9 @@ void nav_floor_copy(struct nav_floor *to, const struct nav_floor *from);
  * joint at borders. Returns the window's log-likelihood, 0 without a lattice. */
 double nav_floor_take(struct nav_floor *, struct nav_joint *, double x, double y, const float *ratio);
 
+/* The tile under the tip at (x, y) of the robot. */
+void nav_floor_at(const struct nav_floor *, const struct nav_joint *, double x, double y, int *column, int *row);
+
 /* Takes over a lattice, whose tiles are not known. right: it stands along the world's right angles. */
 void nav_floor_adopt(struct nav_floor *, struct nav_joint *, const struct nav_lattice *, bool right);
 

@@ -84,6 +84,35 @@ struct nav_mapper_lattice nav_mapper_lattice(const struct nav_mapper *);
 /* Probability of a tile's likeliest texture, and which it is; 0: nothing was read there. */
 double nav_mapper_tile(const struct nav_mapper *, int column, int row, int *texture);
 
+/* A loop that closed: at row `to` a whisker touched, at (x, y) of the robot's frame, the face that it had touched last
+ * at row `from`, at (from_x, from_y) of the robot's frame then; in between the robot had gone a metre or more and its
+ * distance from the face had become uncertain. */
+struct nav_mapper_loop {
+    long from, to;
+    double from_x, from_y, x, y; /* m */
+    double probability;          /* that it is this face */
+    int part;                    /* in whose frame the pose was */
+};
+
+/* Loops so far, in order, the last 4096 at most: the first `room` go to `out`. Returns how many there are. */
+long nav_mapper_loops(const struct nav_mapper *, struct nav_mapper_loop *out, long room);
+
+/* A part of the run between two kidnaps: the robot was carried off before row `first`, which was noticed at row
+ * `noticed`. Its poses are in a frame of its own, whose origin is the first of them, until it was joined at row
+ * `joined` (-1: not yet) with part `into`, in whose frame that origin is at `place`. A part that is noticed and joined
+ * in one row was found in the map of the part before. */
+struct nav_mapper_part {
+    int number, into;
+    long first, noticed, joined;
+    struct nav_pose place;
+};
+
+/* Parts so far, in order, the last 64 at most: the first `room` go to `out`. Returns how many there are. */
+long nav_mapper_parts(const struct nav_mapper *, struct nav_mapper_part *out, long room);
+
+/* The part in whose frame the estimate is. */
+int nav_mapper_frame(const struct nav_mapper *);
+
 uint64_t nav_mapper_bad_cells(const struct nav_mapper *);
 uint64_t nav_mapper_bad_rows(const struct nav_mapper *); /* repeated, late or reordered */
 /* cffi: end */

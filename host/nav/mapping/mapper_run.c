@@ -5,7 +5,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "mapper_state.h"
+#include "kidnap.h"
 
 static const double SCALE_LEAST = 0.3, SCALE_MOST = 1.5; /* of the odometry's noise */
 static const double BEHIND = 30.0;                       /* nats at which a particle is given up */
@@ -31,17 +31,17 @@ static int mapper_init(struct nav_mapper *m)
 {
     const struct nav_problem *problem = m->problem;
     int failed = nav_record_init(&m->record, problem);
-    failed |= nav_trail_init(&m->trail, &problem->arena, &problem->robot);
-    failed |= nav_trail_init(&m->challenger_trail, &problem->arena, &problem->robot);
+    failed |= nav_course_init(&m->course, problem);
     failed |= nav_lattice_search_init(&m->search, problem->arena.classes);
-    failed |= nav_cells_init(&m->cells);
-    failed |= nav_particle_map_init(&m->challenger, problem->arena.classes);
+    failed |= nav_kidnap_init(&m->kidnaps, problem);
+    failed |= nav_kept_init(&m->challenger, problem);
     m->particle = calloc((size_t)m->options.particles, sizeof *m->particle);
     for (int n = 0; m->particle && n < m->options.particles; n++) {
         failed |= nav_particle_map_init(&m->particle[n], problem->arena.classes);
         m->particle[n].scale = mapper_scale(n, m->options.particles);
     }
-    return m->particle ? failed : -1;
+    m->loop = calloc(NAV_MAPPER_LOOPS, sizeof *m->loop);
+    return m->particle && m->loop ? failed : -1;
 }
 
 struct nav_mapper *nav_mapper_new(const struct nav_problem *problem, const struct nav_mapper_options *options)
@@ -53,7 +53,6 @@ struct nav_mapper *nav_mapper_new(const struct nav_problem *problem, const struc
     }
     m->problem = problem;
     m->options = *options;
-    m->caught_up = -1;
     nav_rng_seed(&m->rng, problem->seed, STREAM);
     if (mapper_init(m)) {
         nav_mapper_free(m);
@@ -69,11 +68,11 @@ void nav_mapper_free(struct nav_mapper *m)
     for (int n = 0; m->particle && n < m->options.particles; n++)
         nav_particle_map_free(&m->particle[n]);
     free(m->particle);
-    nav_particle_map_free(&m->challenger);
-    nav_trail_free(&m->trail);
-    nav_trail_free(&m->challenger_trail);
+    free(m->loop);
+    nav_kept_free(&m->challenger);
+    nav_course_free(&m->course);
     nav_lattice_search_free(&m->search);
-    nav_cells_free(&m->cells);
+    nav_kidnap_free(&m->kidnaps);
     nav_record_free(&m->record);
     free(m);
 }
@@ -86,29 +85,14 @@ struct nav_particle_map *nav_mapper_best(const struct nav_mapper *m)
     return best;
 }
 
-static void mapper_follow(const struct nav_mapper *m, struct nav_trail *trail, const struct nav_particle_map *p,
-                          const struct nav_record_row *row)
+void nav_mapper_adopt(struct nav_mapper *m, struct nav_kept *kept)
 {
-    struct nav_pose pose = nav_particle_map_pose(p);
-    bool any = false;
-    nav_trail_move(trail, row->step);
-    for (int tip = 0; tip < m->record.tips; tip++) {
-        const float *window = row->window + (ptrdiff_t)tip * (1 + m->record.classes);
-        if (!(window[0] >= 0.0F))
-            continue;
-        nav_trail_add(trail, &pose, tip, (double)window[0], window + 1);
-        any = true;
-    }
-    if (any)
-        nav_trail_row_done(trail);
-}
-
-static void mapper_mark(struct nav_mapper *m, const struct nav_record_row *row)
-{
-    const struct nav_particle_map *best = nav_mapper_best(m);
-    const double *cov = best->joint.cov;
-    double variance = (cov[NAV_JOINT_X] + cov[NAV_JOINT_Y * (best->joint.room + 1)]) / 2.0;
-    nav_cells_take(&m->cells, &m->record, row, nav_particle_map_pose(best), sqrt(fmax(variance, 0.0)));
+    struct nav_course course = m->course;
+    m->course = kept->course;
+    kept->course = course;
+    for (int n = 0; n < m->options.particles; n++)
+        nav_particle_map_copy(&m->particle[n], &kept->map);
+    m->challenged = false;
 }
 
 /* Hypotheses that the rows speak against go on from the best one, each with its own trust in the odometry. */
@@ -127,55 +111,44 @@ static void mapper_challenge(struct nav_mapper *m)
     const struct nav_particle_map *best = nav_mapper_best(m);
     const struct nav_joint *j = &best->joint;
     struct nav_lattice found;
-    bool due = m->trail.borders > GROWN * m->sought,
+    bool due = m->course.trail.borders > GROWN * m->sought,
          known = j->cov[NAV_JOINT_AXES * (j->room + 1)] < NAV_MAPPER_AXES_KNOWN;
-    if (m->caught_up >= 0 || !due || !m->options.lattice || !nav_record_whole(&m->record))
+    if (m->challenged || !due || !m->options.lattice || m->course.joined || !nav_record_whole(&m->record))
         return;
-    m->sought = m->trail.borders;
-    if (!nav_lattice_find(&m->search, &m->trail, known ? j->mean[NAV_JOINT_AXES] : 0.0, &found))
+    m->sought = m->course.trail.borders;
+    if (!nav_lattice_find(&m->search, &m->course.trail, known ? j->mean[NAV_JOINT_AXES] : 0.0, &found))
         return;
-    m->challenger.scale = best->scale;
-    nav_particle_map_begin(&m->challenger);
+    m->challenger.map.scale = best->scale;
+    nav_kept_begin(&m->challenger, m->course.begun);
+    m->challenger.course.part = m->course.part;
     double off = known ? remainder(found.turn - j->mean[NAV_JOINT_AXES], NAV_PI / 2.0) : 0.0;
-    nav_floor_adopt(&m->challenger.floor, &m->challenger.joint, &found, fabs(off) < RIGHT_MOST);
-    nav_trail_clear(&m->challenger_trail);
-    m->caught_up = 0;
+    nav_floor_adopt(&m->challenger.map.floor, &m->challenger.map.joint, &found, fabs(off) < RIGHT_MOST);
+    m->challenged = true;
 }
 
-static void mapper_take_over(struct nav_mapper *m)
-{
-    struct nav_trail trail = m->trail;
-    m->trail = m->challenger_trail;
-    m->challenger_trail = trail;
-    for (int n = 0; n < m->options.particles; n++)
-        nav_particle_map_copy(&m->particle[n], &m->challenger);
-}
-
-/* The challenger takes some more rows; when it has taken all, it is compared. Without a lattice textures are explained
- * by patches. */
+/* The challenger takes some more rows; when it has taken all, it is compared. */
 static void mapper_catch_up(struct nav_mapper *m)
 {
-    if (m->caught_up < 0)
+    struct nav_kept *c = &m->challenger;
+    if (!m->challenged)
         return;
-    for (int n = 0; n < CATCH_UP && m->caught_up < m->record.rows; n++) {
-        struct nav_record_row row = nav_record_at(&m->record, m->caught_up++);
-        nav_particle_map_take(&m->challenger, &m->record, &row, NULL);
-        mapper_follow(m, &m->challenger_trail, &m->challenger, &row);
-    }
-    if (m->caught_up < m->record.rows)
+    for (int n = 0; n < CATCH_UP && c->course.row < m->course.row; n++)
+        nav_kept_take(c, &m->record);
+    if (c->course.row < m->course.row)
         return;
-    m->caught_up = -1;
-    const struct nav_particle_map *best = nav_mapper_best(m);
-    if (m->challenger.evidence >
-        best->evidence + (best->floor.known ? 0.0 : nav_trail_patches(&m->trail, true)) + MARGIN)
-        mapper_take_over(m);
+    m->challenged = false;
+    double held = nav_course_evidence(&m->course, nav_mapper_best(m)), found = nav_course_evidence(&c->course, &c->map);
+    if (found < held + MARGIN)
+        return;
+    nav_mapper_adopt(m, c);
+    m->kidnaps.then += found - held;
 }
 
 /* Gives a lattice up that patches of any shape explain the windows better than. */
 static void mapper_refuse(struct nav_mapper *m)
 {
     const struct nav_floor *floor = &nav_mapper_best(m)->floor;
-    if (!floor->known || floor->evidence > nav_trail_patches(&m->trail, true) - REFUSED)
+    if (!floor->known || floor->evidence > nav_trail_patches(&m->course.trail, true) - REFUSED)
         return;
     for (int n = 0; n < m->options.particles; n++)
         m->particle[n].floor.known = false;
@@ -210,18 +183,41 @@ static void mapper_answer(const struct nav_mapper *m, struct nav_estimate *out)
     mapper_estimate(m, out);
     double place = fmax((out->covariance[0] + out->covariance[4]) / 2.0, 1e-12), turn = fmax(out->covariance[8], 1e-12);
     out->confidence = (1.0 - exp(-0.5 * NAV_NEAR_M * NAV_NEAR_M / place)) * erf(NAV_NEAR_RAD / sqrt(2.0 * turn));
-    out->evaluations = m->options.particles + (m->caught_up >= 0 ? CATCH_UP : 0);
-    out->bytes =
-        (size_t)(m->options.particles + 1) * nav_particle_map_bytes(m->record.classes) + nav_record_bytes(&m->record);
+    out->evaluations = m->options.particles + (m->challenged ? CATCH_UP : 0);
+    out->bytes = (size_t)m->options.particles * nav_particle_map_bytes(m->record.classes) +
+                 nav_record_bytes(&m->record) + nav_kidnap_bytes(&m->record);
+}
+
+/* Notes the loop that the likeliest hypothesis has just closed. */
+static void mapper_close(struct nav_mapper *m, long row)
+{
+    const struct nav_faces *faces = &nav_mapper_best(m)->faces;
+    const struct nav_closure *c = &faces->closure;
+    if (faces->noted != row)
+        return;
+    m->loop[m->loops++ % NAV_MAPPER_LOOPS] = (struct nav_mapper_loop){.from = c->then.row,
+                                                                      .to = c->now.row,
+                                                                      .from_x = c->then.x,
+                                                                      .from_y = c->then.y,
+                                                                      .x = c->now.x,
+                                                                      .y = c->now.y,
+                                                                      .probability = c->probability,
+                                                                      .part = m->course.part};
 }
 
 void nav_mapper_step(struct nav_mapper *m, const struct nav_row *row, struct nav_estimate *out)
 {
     struct nav_record_row taken = nav_record_at(&m->record, nav_record_take(&m->record, row));
+    const struct nav_particle_map *best = nav_mapper_best(m);
+    double evidence = best->evidence, floor = best->floor.evidence, patches = nav_trail_patches(&m->course.trail, true);
     for (int n = 0; n < m->options.particles; n++)
         nav_particle_map_take(&m->particle[n], &m->record, &taken, n < SCALES ? NULL : &m->rng);
-    mapper_follow(m, &m->trail, nav_mapper_best(m), &taken);
-    mapper_mark(m, &taken);
+    nav_course_follow(&m->course, nav_mapper_best(m), &m->record, &taken);
+    mapper_close(m, taken.number);
+    best = nav_mapper_best(m);
+    floor = best->floor.known ? best->floor.evidence - floor : 0.0;
+    nav_kidnap_take(m, &taken, best->evidence - evidence - floor, floor,
+                    nav_trail_patches(&m->course.trail, true) - patches);
     mapper_resample(m);
     mapper_challenge(m);
     mapper_catch_up(m);

@@ -87,8 +87,8 @@ long nav_record_take(struct nav_record *r, const struct nav_row *row)
     settings.motion.turn_rad = fmax(settings.motion.turn_rad, TURN_RAD);
     bool news = nav_intake_take(&r->intake, row, &motion, &evidence);
     struct nav_noise noise = nav_motion_noise(&r->problem->robot, &settings, &motion);
-    long at = r->rows < r->most ? r->rows : r->most - 1;
-    float *cells = r->cells + at * r->width;
+    long at = r->rows++;
+    float *cells = r->cells + at % r->most * r->width;
     const double head[HEAD] = {motion.step.x, motion.step.y, motion.step.theta, noise.position, noise.heading};
     for (int n = 0; n < HEAD; n++)
         cells[n] = (float)head[n];
@@ -97,14 +97,19 @@ long nav_record_take(struct nav_record *r, const struct nav_row *row)
                          hypot(r->problem->robot.tip[tip].x, r->problem->robot.tip[tip].y) * fabs(motion.step.theta);
     record_contacts(r, news ? &evidence : NULL, cells + HEAD);
     record_windows(r, news ? &evidence : NULL, cells + HEAD + (ptrdiff_t)PER_RAY * r->rays);
-    r->rows++;
     return at;
+}
+
+bool nav_record_has(const struct nav_record *r, long row)
+{
+    return row >= 0 && row >= r->rows - r->most && row < r->rows;
 }
 
 struct nav_record_row nav_record_at(const struct nav_record *r, long row)
 {
-    const float *cells = r->cells + row * r->width;
+    const float *cells = r->cells + row % r->most * r->width;
     return (struct nav_record_row){
+        .number = row,
         .step = {(double)cells[0], (double)cells[1], (double)cells[2]},
         .noise = {(double)cells[3], (double)cells[4]},
         .contact = (const struct nav_record_contact *)(const void *)(cells + HEAD),

@@ -9,7 +9,7 @@ struct nav_record {
     struct nav_intake intake;
     int rays, tips, classes;
     int width;       /* numbers a row */
-    long rows, most; /* kept; room */
+    long rows, most; /* taken; room for the last of them */
     float *cells;    /* [most][width] */
     double *moved;   /* [tips] m since the last window */
     double *ratio;   /* [codes] */
@@ -24,6 +24,7 @@ struct nav_record_contact {
 
 /* One row of it; pointers into the record. */
 struct nav_record_row {
+    long number;
     struct nav_pose step;
     struct nav_noise noise;
     const struct nav_record_contact *contact; /* [rays] */
@@ -34,8 +35,11 @@ struct nav_record_row {
 int nav_record_init(struct nav_record *, const struct nav_problem *);
 void nav_record_free(struct nav_record *);
 
-/* Takes a row and keeps it; when the room is used up, in place of the last one. Returns its number. */
+/* Takes a row and keeps it; when the room is used up, in place of the oldest. Returns its number. */
 long nav_record_take(struct nav_record *, const struct nav_row *);
+
+/* Whether a row is still kept. */
+bool nav_record_has(const struct nav_record *, long row);
 
 struct nav_record_row nav_record_at(const struct nav_record *, long row);
 

@@ -106,9 +106,11 @@ static int segment_choose(const struct segment_choice *c, int count, double chan
     return best;
 }
 
-static void segment_of_face(struct nav_face *g, struct nav_joint *j, const struct nav_touches_line *line,
-                            const struct segment_match *m)
+static void segment_of_face(struct nav_faces *f, struct nav_face *g, struct nav_joint *j,
+                            const struct nav_touches_line *line, const struct segment_match *m, double probability)
 {
+    double known = sqrt(fmax(nav_joint_variance(j, &m->place), 0.0));
+    nav_faces_feel(f, g, (struct nav_touch){.x = line->x, .y = line->y}, known, probability, SEGMENT_HITS);
     nav_joint_measure(j, &m->place, -m->off, line->offset_var + NAV_FACE_ROUGH_M * NAV_FACE_ROUGH_M);
     double turn = nav_wrap(j->mean[NAV_JOINT_HEADING] + line->normal - j->mean[g->index]);
     nav_joint_measure(j, &m->angle, -turn, line->normal_var);
@@ -139,6 +141,7 @@ static void segment_add(struct nav_faces *f, struct nav_joint *j, const struct n
     struct nav_face *g = &f->face[f->count++];
     *g = (struct nav_face){.anchor_x = m[NAV_JOINT_X] + lx, .anchor_y = m[NAV_JOINT_Y] + ly, .right = right};
     g->hits = SEGMENT_HITS;
+    g->seen = (struct nav_sighting){f->row, f->way, line->x, line->y};
     g->index = nav_joint_add(j, normal, &direction, line->normal_var);
     (void)nav_joint_add(j, 0.0, &offset, line->offset_var + NAV_FACE_ROUGH_M * NAV_FACE_ROUGH_M);
     nav_face_feel(g, -line->span / 2.0, line->span / 2.0);
@@ -169,7 +172,7 @@ static double segment_place(struct nav_faces *f, struct nav_joint *j, const stru
         return nav_faces_drain(f, j, touches, line->used, contact, true);
     f->loose &= ~line->used;
     if (chosen < count)
-        segment_of_face(&f->face[chosen], j, line, &choice.match[chosen]);
+        segment_of_face(f, &f->face[chosen], j, line, &choice.match[chosen], choice.likelihood[chosen] / choice.total);
     else if (count < NAV_FACES_MOST)
         segment_add(f, j, line, chosen == count);
     return score;

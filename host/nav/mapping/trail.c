@@ -13,8 +13,10 @@ int nav_trail_init(struct nav_trail *t, const struct nav_arena *arena, const str
     *t = (struct nav_trail){.tips = robot->tips, .classes = arena->classes};
     t->point = calloc(NAV_TRAIL_MOST, sizeof *t->point);
     t->weight = calloc(NAV_TRAIL_MOST * classes, sizeof *t->weight);
+    t->fresh = calloc(NAV_TRAIL_MOST, sizeof *t->fresh);
+    t->tip = calloc(NAV_TRAIL_MOST, sizeof *t->tip);
     t->patch = calloc(NAV_TRAIL_RATES * (size_t)robot->tips * classes + 1, sizeof *t->patch);
-    if (nav_borders_init(&t->finder, arena, robot) || !t->point || !t->weight || !t->patch)
+    if (nav_borders_init(&t->finder, arena, robot) || !t->point || !t->weight || !t->fresh || !t->tip || !t->patch)
         return -1;
     nav_trail_clear(t);
     return 0;
@@ -24,6 +26,8 @@ void nav_trail_free(struct nav_trail *t)
 {
     free(t->point);
     free(t->weight);
+    free(t->fresh);
+    free(t->tip);
     free(t->patch);
     nav_borders_free(&t->finder);
 }
@@ -47,6 +51,32 @@ void nav_trail_clear(struct nav_trail *t)
     for (int n = 0; n < NAV_TRAIL_RATES * t->tips * t->classes; n++)
         t->patch[n] = 1.0 / t->classes;
     trail_clear_finder(&t->finder);
+}
+
+static void trail_copy_finder(struct nav_borders *to, const struct nav_borders *from)
+{
+    size_t tips = (size_t)from->tips, all = tips * (size_t)from->classes;
+    memcpy(to->surface, from->surface, tips * sizeof *to->surface);
+    memcpy(to->held, from->held, tips * sizeof *to->held);
+    memcpy(to->score, from->score, all * sizeof *to->score);
+    memcpy(to->since, from->since, all * sizeof *to->since);
+    to->last = from->last;
+}
+
+void nav_trail_copy(struct nav_trail *to, const struct nav_trail *from)
+{
+    size_t count = (size_t)from->count, classes = (size_t)from->classes;
+    to->count = from->count;
+    to->borders = from->borders;
+    memcpy(to->point, from->point, count * sizeof *to->point);
+    memcpy(to->weight, from->weight, count * classes * sizeof *to->weight);
+    memcpy(to->fresh, from->fresh, count * sizeof *to->fresh);
+    memcpy(to->tip, from->tip, count * sizeof *to->tip);
+    memcpy(to->border, from->border, (size_t)from->borders * sizeof *to->border);
+    memcpy(to->patch, from->patch, NAV_TRAIL_RATES * (size_t)from->tips * classes * sizeof *to->patch);
+    memcpy(to->evidence, from->evidence, sizeof to->evidence);
+    memcpy(to->all, from->all, sizeof to->all);
+    trail_copy_finder(&to->finder, &from->finder);
 }
 
 void nav_trail_move(struct nav_trail *t, struct nav_pose step)
@@ -89,8 +119,13 @@ void nav_trail_add(struct nav_trail *t, const struct nav_pose *pose, int tip, do
     float loglik[256];
     struct nav_crossing crossing;
     bool full = t->count == NAV_TRAIL_MOST;
+    double best = -INFINITY;
     for (int rate = 0; rate < NAV_TRAIL_RATES; rate++) {
         double evidence = trail_patch(t, rate, tip, moved, ratio);
+        if (!full && t->all[rate] > best) {
+            best = t->all[rate];
+            t->fresh[t->count] = (float)evidence;
+        }
         t->all[rate] += evidence;
         t->evidence[rate] += full ? 0.0 : evidence;
     }
@@ -100,6 +135,7 @@ void nav_trail_add(struct nav_trail *t, const struct nav_pose *pose, int tip, do
         trail_keep_border(t, trail_place(pose, &crossing.point));
     if (full)
         return;
+    t->tip[t->count] = (unsigned char)tip;
     memcpy(t->weight + (ptrdiff_t)t->count * t->classes, loglik, (size_t)t->classes * sizeof *loglik);
     t->point[t->count++] = trail_place(pose, &t->finder.tip[tip]);
 }

@@ -14,6 +14,8 @@ struct nav_trail {
     int tips, classes, count, borders;
     struct nav_trail_point *point;                    /* [MOST] of windows */
     float *weight;                                    /* [MOST][classes] their log-likelihoods */
+    float *fresh;                                     /* [MOST] the same by patches, given the windows before */
+    unsigned char *tip;                               /* [MOST] */
     struct nav_trail_point border[NAV_TRAIL_BORDERS]; /* where textures change */
     double *patch; /* [RATES][tips][classes] belief of the texture under each tip, by patches of each size */
     double evidence[NAV_TRAIL_RATES]; /* log-likelihood of the windows of the trail */
@@ -25,6 +27,9 @@ struct nav_trail {
 int nav_trail_init(struct nav_trail *, const struct nav_arena *, const struct nav_robot *);
 void nav_trail_free(struct nav_trail *);
 void nav_trail_clear(struct nav_trail *);
+
+/* Becomes equal, of the same robot. */
+void nav_trail_copy(struct nav_trail *to, const struct nav_trail *from);
 
 /* The robot's motion as its wheels report it, before a row's windows. */
 void nav_trail_move(struct nav_trail *, struct nav_pose step);

@@ -173,7 +173,7 @@ class Loop:
 
     def run(self, until_locked: bool = True) -> Outcome:
         """Drives for at most as many rows as were given, from the start or from each."""
-        begun = self.recipe.kidnap_row or 0
+        begun = max(self.recipe.kidnap_rows, default=0)
         self._drive(self._start, self.seed, begun or self._rows, until_locked and not begun)
         if begun:
             there = carried_to(

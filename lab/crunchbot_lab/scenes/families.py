@@ -19,6 +19,7 @@ from .readings import World
 
 KIDNAP_LEAST_M = 0.8
 KIDNAP_ROW, KIDNAP_ROWS = 300, 1200
+MAPPING_ROWS, CARRIED, CARRIED_TWICE = 3000, (1500,), (1000, 2000)
 SLIPS, SLIP_ROWS = 4, 10
 NORMAL_SD_DEG = 5.0
 GYRO_DEG = 0.2
@@ -43,7 +44,7 @@ class Recipe:
     uniform: bool = False  # the prior
     wrong_m: float = 0.0  # the prior's mean is off by so much
     wrong_rad: float = 0.0
-    kidnap_row: int | None = None
+    kidnap_rows: tuple[int, ...] = ()  # before which the robot is carried off
     moves: bool = False  # half-way a box is moved; the scene has it where it stands at the end
     slips: int = 0
     faults: tuple[Fault, ...] = ()
@@ -132,8 +133,18 @@ MODIFIERS: dict[str, tuple[str, Callable[[Recipe], Recipe]]] = {
     "global": ("nothing is known of the start", lambda r: replace(r, uniform=True)),
     "kidnap": (
         f"carried at least {KIDNAP_LEAST_M:g} m after {KIDNAP_ROW} rows of {KIDNAP_ROWS}",
-        lambda r: replace(r, kidnap_row=KIDNAP_ROW, rows=KIDNAP_ROWS),
+        lambda r: replace(r, kidnap_rows=(KIDNAP_ROW,), rows=KIDNAP_ROWS),
     ),
+    **{
+        name: (
+            f"carried likewise {how} of {MAPPING_ROWS} rows",
+            lambda r, at=at: replace(r, kidnap_rows=at, rows=MAPPING_ROWS),
+        )
+        for name, how, at in (
+            ("carried", "half-way", CARRIED),
+            ("carried-twice", "after a third and two", CARRIED_TWICE),
+        )
+    },
     **{f"wrong-{m:g}m": (f"prior wrong by {m:g} m", _wrong(metres=m)) for m in (0.2, 0.5, 1.0)},
     **{f"wrong-{d}deg": (f"prior wrong by {d} degrees", _wrong(degrees=d)) for d in (90, 180)},
     **{

@@ -61,11 +61,12 @@ def make_recipe(r: Recipe, seed: int, rows: int | None = None, path_seed: int | 
     robot = r.robot()
     arena = r.arena(rng["arena"], robot.body_radius_m)
     start = walk.draw_pose(arena, robot.body_radius_m, rng["start"])
-    middle, at, parts, kidnaps = rows // 2 if r.moves else None, start, [], ()
-    cuts = {0, rows} | {row for row in (r.kidnap_row, middle) if row is not None and row < rows}
+    middle, at, parts = rows // 2 if r.moves else None, start, []
+    kidnaps = tuple(row for row in r.kidnap_rows if row < rows)
+    cuts = {0, rows, *kidnaps} | ({middle} if middle else set())
     for first, until in pairwise(sorted(cuts)):
-        if first and first == r.kidnap_row:
-            at, kidnaps = carried_to(arena, robot.body_radius_m, at, rng["kidnap"]), (first,)
+        if first in kidnaps:
+            at = carried_to(arena, robot.body_radius_m, at, rng["kidnap"])
         if first and first == middle:
             arena = arenas.with_moved_box(arena, robot.body_radius_m, at[:2], rng["move"])
         parts.append(_drive(r, arena, robot, at, until - first, rng))

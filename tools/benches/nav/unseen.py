@@ -166,7 +166,7 @@ FAMILIES: dict[str, Family] = {
 STARTS: dict[str, tuple[str, Callable[[Recipe], Recipe]]] = {
     "k": ("known", lambda r: r),
     "a": ("anywhere", lambda r: replace(r, uniform=True)),
-    "d": ("kidnap", lambda r: replace(r, kidnap_row=200, rows=max(r.rows, 800))),
+    "d": ("kidnap", lambda r: replace(r, kidnap_rows=(200,), rows=max(r.rows, 800))),
 }
 # Mechanisms that a setting leaves out, and the families and starts that they are judged on.
 LEFT_OUT = {

@@ -10,8 +10,8 @@ static const double SIGMAS = 2.0; /* of the position, that the body is taken to 
 
 int nav_cells_init(struct nav_cells *c)
 {
+    *c = (struct nav_cells){.from = {NAV_CELLS_SIDE, NAV_CELLS_SIDE}};
     c->odds = calloc((size_t)NAV_CELLS_SIDE * NAV_CELLS_SIDE, sizeof *c->odds);
-    nav_cells_clear(c);
     return c->odds ? 0 : -1;
 }
 
@@ -20,13 +20,32 @@ void nav_cells_free(struct nav_cells *c)
     free(c->odds);
 }
 
+static void cells_blank(struct nav_cells *c)
+{
+    for (int row = c->from[1]; row < c->until[1]; row++)
+        memset(c->odds + (ptrdiff_t)row * NAV_CELLS_SIDE + c->from[0], 0,
+               (size_t)(c->until[0] - c->from[0]) * sizeof *c->odds);
+}
+
 void nav_cells_clear(struct nav_cells *c)
 {
-    if (c->odds)
-        memset(c->odds, 0, (size_t)NAV_CELLS_SIDE * NAV_CELLS_SIDE * sizeof *c->odds);
+    cells_blank(c);
     for (int axis = 0; axis < 2; axis++) {
         c->from[axis] = NAV_CELLS_SIDE;
         c->until[axis] = 0;
+    }
+}
+
+void nav_cells_copy(struct nav_cells *to, const struct nav_cells *from)
+{
+    cells_blank(to);
+    for (int axis = 0; axis < 2; axis++) {
+        to->from[axis] = from->from[axis];
+        to->until[axis] = from->until[axis];
+    }
+    for (int row = from->from[1]; row < from->until[1]; row++) {
+        ptrdiff_t at = (ptrdiff_t)row * NAV_CELLS_SIDE + from->from[0];
+        memcpy(to->odds + at, from->odds + at, (size_t)(from->until[0] - from->from[0]) * sizeof *to->odds);
     }
 }
 
@@ -45,6 +64,14 @@ void nav_cells_hold(int from[2], int until[2], double x, double y)
         from[axis] = cell < from[axis] ? cell : from[axis];
         until[axis] = cell >= until[axis] ? cell + 1 : until[axis];
     }
+}
+
+double nav_cells_odds(const struct nav_cells *c, double x, double y)
+{
+    int column = nav_cells_at(x), row = nav_cells_at(y);
+    if (column < 0 || row < 0 || column >= NAV_CELLS_SIDE || row >= NAV_CELLS_SIDE)
+        return 0.0;
+    return (double)c->odds[(ptrdiff_t)row * NAV_CELLS_SIDE + column];
 }
 
 static void cells_add(struct nav_cells *c, int column, int row, double odds)
@@ -83,6 +110,7 @@ static void cells_whisker(struct nav_cells *c, const struct nav_record_contact *
     if (met)
         cells_add(c, nav_cells_at(base.x + end * cos(base.theta)), nav_cells_at(base.y + end * sin(base.theta)),
                   share * MET);
+    nav_cells_hold(c->from, c->until, base.x, base.y);
     nav_cells_hold(c->from, c->until, base.x + end * cos(base.theta), base.y + end * sin(base.theta));
 }
 
@@ -103,21 +131,5 @@ void nav_cells_take(struct nav_cells *c, const struct nav_record *r, const struc
         struct nav_pose base = nav_compose(pose, (struct nav_pose){place->x, place->y, atan2(place->s, place->c)});
         if (row->contact[ray].weight > 0.0F)
             cells_whisker(c, &row->contact[ray], rays[ray].length, base, here * (double)row->contact[ray].weight);
-    }
-}
-
-void nav_cells_add(struct nav_cells *c, const struct nav_cells *other, struct nav_pose place)
-{
-    for (int row = other->from[1]; row < other->until[1]; row++) {
-        for (int column = other->from[0]; column < other->until[0]; column++) {
-            float odds = other->odds[(ptrdiff_t)row * NAV_CELLS_SIDE + column];
-            if (odds == 0.0F)
-                continue;
-            struct nav_pose middle = {(column - NAV_CELLS_SIDE / 2 + 0.5) * NAV_CELLS_M,
-                                      (row - NAV_CELLS_SIDE / 2 + 0.5) * NAV_CELLS_M, 0.0};
-            struct nav_pose at = nav_compose(place, middle);
-            cells_add(c, nav_cells_at(at.x), nav_cells_at(at.y), (double)odds);
-            nav_cells_hold(c->from, c->until, at.x, at.y);
-        }
     }
 }

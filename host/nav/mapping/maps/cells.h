@@ -16,6 +16,10 @@ struct nav_cells {
 int nav_cells_init(struct nav_cells *);
 void nav_cells_free(struct nav_cells *);
 void nav_cells_clear(struct nav_cells *);
+void nav_cells_copy(struct nav_cells *to, const struct nav_cells *from);
+
+/* Log-odds at a point; 0 where nothing is known. */
+double nav_cells_odds(const struct nav_cells *, double x, double y);
 
 /* Takes what whiskers touched and passed in a row, and where the body stood. sigma: m, of the position. */
 void nav_cells_take(struct nav_cells *, const struct nav_record *, const struct nav_record_row *, struct nav_pose pose,
@@ -26,8 +30,5 @@ int nav_cells_at(double metres);
 
 /* Widens what is known to hold a point, as far as there are cells. */
 void nav_cells_hold(int from[2], int until[2], double x, double y);
-
-/* Adds the cells of another map, whose frame is at `place` in this one's. */
-void nav_cells_add(struct nav_cells *, const struct nav_cells *other, struct nav_pose place);
 
 #endif

@@ -122,8 +122,8 @@ static void mapper_known(const struct nav_mapper *m, int from[2], int until[2])
     const struct nav_particle_map *p = nav_mapper_best(m);
     struct nav_mapper_face s;
     for (int axis = 0; axis < 2; axis++) {
-        from[axis] = m->cells.from[axis];
-        until[axis] = m->cells.until[axis];
+        from[axis] = m->course.cells.from[axis];
+        until[axis] = m->course.cells.until[axis];
     }
     for (int n = 0; n < p->faces.count; n++) {
         for (int cell = mapper_stretch(p, n, 0, &s); cell > 0; cell = mapper_stretch(p, n, cell, &s)) {
@@ -178,7 +178,7 @@ void nav_mapper_occupancy(const struct nav_mapper *m, float *out)
     struct nav_mapper_face s;
     int column = nav_cells_at(grid.x + grid.cell / 2.0), line = nav_cells_at(grid.y + grid.cell / 2.0);
     for (int row = 0; row < grid.rows; row++) {
-        const float *odds = m->cells.odds + (ptrdiff_t)(line + row) * NAV_CELLS_SIDE + column;
+        const float *odds = m->course.cells.odds + (ptrdiff_t)(line + row) * NAV_CELLS_SIDE + column;
         for (int n = 0; n < grid.columns; n++)
             out[(ptrdiff_t)row * grid.columns + n] = 1.0F / (1.0F + expf(-odds[n]));
     }
@@ -214,4 +214,24 @@ struct nav_mapper_lattice nav_mapper_lattice(const struct nav_mapper *m)
 double nav_mapper_tile(const struct nav_mapper *m, int column, int row, int *texture)
 {
     return nav_floor_sure(&nav_mapper_best(m)->floor, column, row, texture);
+}
+
+long nav_mapper_parts(const struct nav_mapper *m, struct nav_mapper_part *out, long room)
+{
+    for (long n = 0; n < room && n < m->kidnaps.parts; n++)
+        out[n] = m->kidnaps.part[n];
+    return m->kidnaps.parts;
+}
+
+int nav_mapper_frame(const struct nav_mapper *m)
+{
+    return m->course.part;
+}
+
+long nav_mapper_loops(const struct nav_mapper *m, struct nav_mapper_loop *out, long room)
+{
+    long count = m->loops < NAV_MAPPER_LOOPS ? m->loops : NAV_MAPPER_LOOPS;
+    for (long n = 0; n < room && n < count; n++)
+        out[n] = m->loop[(m->loops - count + n) % NAV_MAPPER_LOOPS];
+    return count;
 }

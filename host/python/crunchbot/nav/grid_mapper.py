@@ -6,7 +6,7 @@ import numpy as np
 
 from ..native import lib
 from ..scene import Robot
-from .mapper import FACE, FACES, Mapper, TouchMap
+from .mapper import FACE, FACES, Mapper, Part, TouchMap
 
 
 class GridMapper(Mapper):
@@ -35,6 +35,14 @@ class GridMapper(Mapper):
     def map(self) -> TouchMap:
         """The map after the last row."""
         return TouchMap(self.faces(), None, None, {}, grid=self._grid())
+
+    def parts(self) -> list[Part]:
+        """One: a robot that is carried off is not noticed."""
+        return [Part(0, 0, 0, None, None, None)]
+
+    @property
+    def frame(self) -> int:
+        return 0
 
     def faces(self) -> np.ndarray:
         """(n,) of FACE."""

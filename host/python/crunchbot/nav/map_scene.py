@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..occupancy import FREE, SOLID, UNKNOWN, Box, Pose, boxes_of, from_map
+from ..occupancy import FREE, SOLID, UNKNOWN, Box, Pose, boxes_of, from_map, to_map
 from ..scene import NOT_KNOWN, Arena, Robot
-from .mapper import TouchMap
+from .mapper import Grid, TouchMap
 from .observations import Observations
 
 CELL_M = 0.025
@@ -25,11 +25,12 @@ GAP_M = 0.15  # between two stretches of one face, that is taken as solid
 @dataclass(frozen=True)
 class MapScene:
     """An arena, the pose of its frame in that of the first pose, and cells of CELL_M: (rows, columns) of FREE, SOLID or
-    UNKNOWN, the first row at the lowest y."""
+    UNKNOWN, the first row at the lowest y; and probabilities that something solid is there, 0.5: nothing is known."""
 
     arena: Arena
     origin: Pose
     cells: np.ndarray
+    occupied: np.ndarray
 
 
 def map_scene(
@@ -56,7 +57,21 @@ def map_scene(
     arena = Arena((float(size[0]), float(size[1])), float(tile), textures, floor, tuple(solid), unknown)
     c, s = math.cos(start[2]), math.sin(start[2])
     x, y = start[0] + c * corner[0] - s * corner[1], start[1] + s * corner[0] + c * corner[1]
-    return MapScene(arena, (float(x), float(y), start[2]), cells)
+    origin = (float(x), float(y), start[2])
+    return MapScene(arena, origin, cells, _occupied(touched.grid, origin, cells.shape))
+
+
+def _occupied(grid: Grid | None, origin: Pose, shape: tuple[int, ...]) -> np.ndarray:
+    """Probabilities of the map's cells in the arena's frame: each that of the cell about its middle."""
+    out = np.full(shape, 0.5, np.float32)
+    if grid is None or not grid.occupied.size:
+        return out
+    rows, columns = np.indices(shape).reshape(2, -1)
+    middles = to_map(np.column_stack([(columns + 0.5) * CELL_M, (rows + 0.5) * CELL_M, np.zeros(rows.size)]), origin)
+    at = np.floor((middles[:, :2] - [grid.x, grid.y]) / grid.cell).astype(int)
+    inside = (at >= 0).all(axis=1) & (at < grid.occupied.shape[::-1]).all(axis=1)
+    out[rows[inside], columns[inside]] = grid.occupied[at[inside, 1], at[inside, 0]]
+    return out
 
 
 def _frame(touched: TouchMap) -> Pose:

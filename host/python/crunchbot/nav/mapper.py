@@ -20,9 +20,16 @@ FACE = np.dtype(
     + [("face", "i4"), ("right", "i4")]
 )
 CORNER = np.dtype([(name, "f8") for name in ("x", "y", "xx", "xy", "yy")] + [("face", "i4", 2)])
+LOOP = np.dtype(
+    [(name, "i8") for name in ("from", "to")]
+    + [(name, "f8") for name in ("from_x", "from_y", "x", "y", "probability")]
+    + [("part", "i8")]
+)
+LOOPS = ffi.typeof("struct nav_mapper_loop[]")
 FACES, CORNERS = ffi.typeof("struct nav_mapper_face[]"), ffi.typeof("struct nav_mapper_corner[]")
 assert FACE.itemsize == ffi.sizeof("struct nav_mapper_face")
 assert CORNER.itemsize == ffi.sizeof("struct nav_mapper_corner")
+assert LOOP.itemsize == ffi.sizeof("struct nav_mapper_loop")
 SEED_MOST = 2**64 - 1
 PARTICLES_MOST = 5000
 PATCH_M = 0.3
@@ -47,6 +54,21 @@ class Lattice:
 
 
 @dataclass(frozen=True)
+class Part:
+    """A part of the run between two kidnaps: the robot was carried off before row `first`, noticed at row `noticed`. Its
+    poses are in a frame of its own, whose origin is the first of them, until it was joined at row `joined` with part
+    `into`, in whose frame that origin is at `place` (x, y m, theta rad); None: it was not. A part that is noticed and
+    joined in one row was found in the map of the part before."""
+
+    number: int
+    first: int
+    noticed: int
+    joined: int | None
+    into: int | None
+    place: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True)
 class Grid:
     """Square cells of `cell` m along the first pose's axes, the lower left corner of them all at (`x`, `y`), m. `occupied`:
     (rows, columns) probability that something solid is there, the lowest y first; 0.5: nothing is known."""
@@ -62,6 +84,9 @@ class TouchMap:
     """What is believed of the world. `faces`: (n,) of FACE, stretches that were felt; `axes`: direction of their right
     angles, rad, None: not known; `lattice`: None where the evidence is for none. `tiles`: (column, row) of the lattice to
     (index of its likeliest texture, probability). `corners`: (n,) of CORNER, where faces meet, m, with covariance, m^2.
+    `loops`: (n,) of LOOP, those that closed so far, the last 4096 at most: at row `to` a whisker touched (x, y) m of the
+    robot's frame, a face that it had touched last at row `from`. `frame`: number of the part of the run (Mapper.parts)
+    whose first pose is the origin.
     """
 
     faces: np.ndarray
@@ -70,6 +95,8 @@ class TouchMap:
     tiles: dict[tuple[int, int], tuple[int, float]]
     corners: np.ndarray = field(default_factory=lambda: np.zeros(0, CORNER))
     grid: Grid | None = None
+    loops: np.ndarray = field(default_factory=lambda: np.zeros(0, LOOP))
+    frame: int = 0
 
 
 class Mapper:
@@ -124,9 +151,27 @@ class Mapper:
     def map(self) -> TouchMap:
         """The map after the last row: cheap enough for once a second."""
         corners = self._listed(lib.nav_mapper_corners, CORNERS, CORNER, "corners")
+        loops = self._listed(lib.nav_mapper_loops, LOOPS, LOOP, "loops")
         axes, lattice = lib.nav_mapper_lattice(self._mapper).axes, self.lattice()
         tiles = dict(self._tiles()) if lattice else {}
-        return TouchMap(self.faces(), None if axes != axes else float(axes), lattice, tiles, corners, self._grid())
+        known = None if axes != axes else float(axes)
+        return TouchMap(self.faces(), known, lattice, tiles, corners, self._grid(), loops, self.frame)
+
+    def parts(self) -> list[Part]:
+        """What the run fell into so far; one part where the robot was never carried off."""
+        count = lib.nav_mapper_parts(self._mapper, ffi.NULL, 0)
+        found = ffi.new("struct nav_mapper_part[]", count)
+        lib.nav_mapper_parts(self._mapper, found, count)
+        out = []
+        for p in found:
+            joined = (int(p.joined), int(p.into), (p.place.x, p.place.y, p.place.theta))
+            out.append(Part(p.number, p.first, p.noticed, *(joined if p.joined >= 0 else (None, None, None))))
+        return out
+
+    @property
+    def frame(self) -> int:
+        """Number of the part in whose frame the last estimate and the map are."""
+        return int(lib.nav_mapper_frame(self._mapper))
 
     def faces(self) -> np.ndarray:
         """(n,) of FACE, stretches that were felt."""

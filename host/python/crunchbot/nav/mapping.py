@@ -1,12 +1,13 @@
 """A map from the rows of a scene folder, without the arena that the folder may hold; and the folder that is written."""
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..occupancy import FREE, SOLID, from_map
+from ..occupancy import FREE, SOLID, Pose, from_map, to_map
 from ..progress import bar
 from ..scene import OBSERVATIONS, Arena, Prior, Robot, Scene, load_robot, write
 from ..tables import TableError, read_rows, unwritable
@@ -14,11 +15,12 @@ from .filters import ESTIMATE
 from .grid_mapper import GridMapper
 from .map_graph import GraphMapper
 from .map_scene import CELL_M, MapScene, map_scene
-from .mapper import PATCH_M, Mapper, TouchMap
+from .mapper import PATCH_M, Mapper, Part, TouchMap
 from .observations import Observations, read_observations
 
 CHUNK = 100  # rows between two steps of the progress bar
-FACES, TILES, ESTIMATES, IMAGE, MAP = "faces.csv", "tiles.csv", "est.csv", "map.png", "map.yaml"
+FACES, TILES, CORNERS, CLOSURES, PARTS = "faces.csv", "tiles.csv", "corners.csv", "closures.csv", "parts.csv"
+ESTIMATES, IMAGE, MAP, CELLS = "est.csv", "map.png", "map.yaml", "occupancy.npy"
 START_SIGMA = (0.02, 0.02, 0.03)  # of the first pose in prior.toml: m, m, rad
 REPRESENTATIONS: dict[str, type[Mapper] | type[GraphMapper]] = {
     "faces": Mapper,
@@ -31,7 +33,9 @@ GREY_UNKNOWN = 205
 
 @dataclass(frozen=True)
 class Mapped:
-    """A run over all rows: the estimates (n,) of ESTIMATE in the frame of the first pose, and what is left at its end."""
+    """A run over all rows: the estimates (n,) of ESTIMATE, each from the rows until then, and what is left at its end.
+    `frame` (n,): the part of the run in whose frame an estimate is. Those of a part that was joined with another are in
+    the other's frame, moved there afterwards; without kidnaps all are in that of the first pose, 0."""
 
     robot: Robot
     textures: tuple[str, ...]
@@ -41,9 +45,20 @@ class Mapped:
     touched: TouchMap
     bad_cells: int
     bad_rows: int
+    parts: tuple[Part, ...] = ()
+    frame: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+
+    def poses(self) -> np.ndarray:
+        """(n, 3) in the frame of the map; nan where a row's is not known in it: before an unjoined kidnap, and from a
+        kidnap until it was noticed."""
+        out = self.table["pose"].copy()
+        out[self.frame != self.touched.frame] = np.nan
+        for part in self.parts[1:]:
+            out[part.first : part.noticed] = np.nan
+        return out
 
     def scene(self) -> MapScene:
-        return map_scene(self.touched, self.table["pose"], self.rows, self.robot, self.textures)
+        return map_scene(self.touched, self.poses(), self.rows, self.robot, self.textures)
 
 
 def read(folder: str | Path) -> tuple[Robot, tuple[str, ...], Observations]:
@@ -90,12 +105,38 @@ def run(
     for first in bar(range(0, len(rows), CHUNK), disable=quiet, unit_scale=CHUNK, unit="rows", desc="map"):
         parts.append(mapper.replay(rows, first, min(CHUNK, len(rows) - first)))
     table, step_us = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Mapped(robot, textures, rows, table, step_us, mapper.map(), mapper.bad_cells, mapper.bad_rows)
+    return left_by(mapper, robot, textures, rows, table, step_us)
+
+
+def left_by(
+    mapper: Mapper, robot: Robot, textures: tuple[str, ...], rows: Observations, table: np.ndarray, step_us: np.ndarray
+) -> Mapped:
+    """What a mapper has made of rows: `table` (n,) of ESTIMATE, as it gave them."""
+    parts, table = tuple(mapper.parts()), table.copy()
+    frame = _joined(table, parts)
+    left = (mapper.map(), mapper.bad_cells, mapper.bad_rows)
+    return Mapped(robot, textures, rows, table, step_us, *left, parts, frame)
+
+
+def _joined(table: np.ndarray, parts: tuple[Part, ...]) -> np.ndarray:
+    """Moves estimates of joined parts into the frames of those that they were joined with. (n,) part of each frame."""
+    frame = np.zeros(len(table), int)
+    for part in parts[1:]:
+        frame[max(part.noticed - 1, 0) : None if part.joined is None else part.joined - 1] = part.number
+    for part in sorted((p for p in parts if p.place is not None), key=lambda p: p.joined):
+        rows = (frame == part.number) & (np.arange(len(table)) < part.joined)
+        x, y, turn = part.place
+        c, s = math.cos(turn), math.sin(turn)
+        turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        table["pose"][rows] = to_map(table["pose"][rows], (x, y, turn))
+        table["covariance"][rows] = turned @ table["covariance"][rows] @ turned.T
+        frame[rows] = part.into
+    return frame
 
 
 def write_map(folder: str | Path, mapped: Mapped) -> MapScene:
-    """Write arena.toml, robot.toml, prior.toml, faces.csv, tiles.csv, est.csv, map.png and map.yaml; TableError when it
-    cannot be."""
+    """Write arena.toml, robot.toml, prior.toml, tables of faces, corners, tiles, closures, parts and estimates, map.png,
+    map.yaml and occupancy.npy; TableError when it cannot be."""
     folder, made = Path(folder), mapped.scene()
     start = from_map(np.zeros((1, 3)), made.origin)[0]
     prior = Prior("gaussian", tuple(float(v) for v in start), START_SIGMA)
@@ -119,14 +160,46 @@ def _write_tables(folder: Path, mapped: Mapped, made: MapScene) -> None:
         faces.append(",".join(f"{v:.6f}" for v in place) + f",{face['hits']:.0f},{face['right']}")
     tiles = ["column,row,texture,probability"]
     tiles += [f"{column},{row},{mapped.textures[k]},{p:.6f}" for (column, row), (k, p) in sorted(touched.tiles.items())]
-    poses = ["t_s,x_m,y_m,theta_rad,confidence,xx_m2,xy_m2,yy_m2"]
-    cells = (mapped.rows.t_text, mapped.table["pose"], mapped.table["confidence"], mapped.table["covariance"])
-    for t_s, pose, sure, cov in zip(*cells, strict=True):
+    poses = ["t_s,x_m,y_m,theta_rad,confidence,xx_m2,xy_m2,yy_m2,part"]
+    table = mapped.table
+    cells = (mapped.rows.t_text, table["pose"], table["confidence"], table["covariance"], mapped.frame)
+    for t_s, pose, sure, cov, part in zip(*cells, strict=True):
         numbers = (*pose, sure)
         spread = (cov[0, 0], cov[0, 1], cov[1, 1])
-        poses.append(",".join([t_s, *(f"{v:.6f}" for v in numbers), *(f"{v:.4g}" for v in spread)]))
-    for name, lines in ((FACES, faces), (TILES, tiles), (ESTIMATES, poses)):
+        poses.append(",".join([t_s, *(f"{v:.6f}" for v in numbers), *(f"{v:.4g}" for v in spread), str(part)]))
+    named = ((FACES, faces), (TILES, tiles), (ESTIMATES, poses), (CORNERS, _corners(touched, made.origin)))
+    for name, lines in (*named, (CLOSURES, _closures(mapped)), (PARTS, _parts(mapped))):
         (folder / name).write_text("\n".join(lines) + "\n")
+
+
+def _corners(touched: TouchMap, origin: Pose) -> list[str]:
+    c, s = math.cos(origin[2]), math.sin(origin[2])
+    back, lines = np.array([[c, s], [-s, c]]), ["x_m,y_m,xx_m2,xy_m2,yy_m2"]
+    for corner in touched.corners:
+        x, y, _ = from_map(np.array([[corner["x"], corner["y"], 0.0]]), origin)[0]
+        cov = back @ np.array([[corner["xx"], corner["xy"]], [corner["xy"], corner["yy"]]]) @ back.T
+        lines.append(f"{x:.6f},{y:.6f},{cov[0, 0]:.4g},{cov[0, 1]:.4g},{cov[1, 1]:.4g}")
+    return lines
+
+
+def _closures(mapped: Mapped) -> list[str]:
+    """Loops that closed; times are those of the rows."""
+    lines, t_text = ["t_s,from_t_s,x_m,y_m,from_x_m,from_y_m,probability"], mapped.rows.t_text
+    for loop in mapped.touched.loops:
+        places = (loop["x"], loop["y"], loop["from_x"], loop["from_y"])
+        cells = [t_text[loop["to"]], t_text[loop["from"]], *(f"{v:.4f}" for v in places)]
+        lines.append(",".join([*cells, f"{loop['probability']:.6f}"]))
+    return lines
+
+
+def _parts(mapped: Mapped) -> list[str]:
+    lines = ["part,first_row,noticed_row,joined_row,into,x_m,y_m,theta_rad"]
+    for part in mapped.parts:
+        joined = (
+            ("", "", "", "", "") if part.place is None else (part.joined, part.into, *map("{:.6f}".format, part.place))
+        )
+        lines.append(",".join(map(str, (part.number, part.first, part.noticed, *joined))))
+    return lines
 
 
 def _write_image(folder: Path, made: MapScene) -> None:
@@ -136,6 +209,7 @@ def _write_image(folder: Path, made: MapScene) -> None:
     for kind, level in GREYS.items():
         grey[made.cells == kind] = level
     Image.fromarray(grey[::-1]).save(folder / IMAGE)
+    np.save(folder / CELLS, made.occupied)
     text = f"image: {IMAGE}\nmode: trinary\nresolution: {CELL_M}\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n"
     (folder / MAP).write_text(text + "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
 
@@ -154,6 +228,9 @@ def summary(mapped: Mapped, made: MapScene) -> dict:
         "step_us_mean": round(float(us.mean()), 1),
         "step_us_p99": round(float(np.quantile(us, 0.99)), 1),
         "peak_bytes": int(mapped.table["bytes"].max()) if len(mapped.table) else 0,
+        "loops": len(touched.loops),
+        "parts": len(mapped.parts),
+        "joined": sum(part.joined is not None for part in mapped.parts),
         "bad_cells": mapped.bad_cells,
         "bad_rows": mapped.bad_rows,
     }

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..nav.filters import COMPONENT
 from ..nav.mapper import PATCH_M, Mapper, TouchMap
-from ..nav.mapping import Mapped, textures_in, write_map
+from ..nav.mapping import left_by, textures_in, write_map
 from ..nav.observations import Observations, joined
 from ..observation import NORMAL, Quantity, Row, has_normals
 from ..scene import Arena, Robot, Scene
@@ -190,11 +190,13 @@ class MapperProcess:
         self._touched = self._mapper.map()
         if self._settings.out is None:
             return
-        rows, mapper = joined(self._rows), self._mapper
-        table, step_us = np.concatenate(self._tables), np.concatenate(self._steps_us)
-        counts = (mapper.bad_cells, mapper.bad_rows)
-        textures = self._scene.arena.textures
-        write_map(self._settings.out, Mapped(self._robot, textures, rows, table, step_us, self._touched, *counts))
+        table, step_us, textures = (
+            np.concatenate(self._tables),
+            np.concatenate(self._steps_us),
+            self._scene.arena.textures,
+        )
+        rows = joined(self._rows)
+        write_map(self._settings.out, left_by(self._mapper, self._robot, textures, rows, table, step_us))
 
 
 def _component(estimate: np.ndarray) -> np.ndarray:

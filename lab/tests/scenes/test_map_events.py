@@ -1,0 +1,97 @@
+"""Kidnaps while mapping and loops that close: said when they are, not said when they are not, and judged right."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crunchbot.nav import mapping
+from crunchbot.nav.mapper import LOOP
+from crunchbot_lab.scenes import map_events, own_map
+from crunchbot_lab.scenes.making import make
+from crunchbot_lab.scenes.map_scoring import best_motion
+
+
+def mapped(family: str, seed: int, rows: int = 3000):
+    made = make(family, seed, rows)
+    return made, mapping.run(made.scene.robot, made.scene.arena.textures, made.observations, seed)
+
+
+@pytest.fixture(scope="module")
+def carried():
+    return mapped("free+carried", 5)
+
+
+def test_a_kidnap_is_noticed_and_both_maps_become_one(carried):
+    made, run = carried
+    found = map_events.kidnaps_score(run, made.kidnaps)
+    assert found["joined"] == 1.0 and found["joined_false"] == 0.0 and found["alarms_false"] == 0.0
+    assert 0.0 < found["noticed_rows"] < 300.0
+    part = run.parts[1]
+    assert part.into == 0 and part.first <= part.noticed <= part.joined
+    assert not run.frame.any() and run.touched.frame == 0
+    motion = best_motion(run.table["pose"][:1500, :2], made.observations.truth[:1500, :2])
+    off = np.hypot(*(motion.points(run.table["pose"][:, :2]) - made.observations.truth[:, :2]).T)
+    assert np.median(off[part.noticed :]) < 0.1
+
+
+def test_until_maps_meet_estimates_are_in_a_frame_of_their_own(carried):
+    made, _ = carried
+    rows, stop = made.observations, 1570
+    cut = {name: getattr(rows, name)[:stop] for name in ("t_s", "odometry", "texture", "radial_m", "truth")}
+    run = mapping.run(made.scene.robot, made.scene.arena.textures, replace(rows, t_text=rows.t_text[:stop], **cut), 5)
+    assert len(run.parts) == 2 and run.parts[1].joined is None
+    assert run.touched.frame == 1 and run.frame[-1] == 1 and run.frame[0] == 0
+    known = np.isfinite(run.poses()).all(axis=1)
+    assert not known[:1500].any() and known[-1]
+    assert np.abs(run.table["pose"][-1, :2]).max() < 2.0  # near the new origin
+    assert run.scene().arena.size_m[0] < 4.0
+
+
+@pytest.mark.parametrize(
+    "family", ["anchor", "anchor+slip", "anchor+moving-box", "anchor+renamed", "anchor+silent-minute"]
+)
+def test_nothing_is_noticed_where_nobody_was_carried(family):
+    _, run = mapped(family, 4)
+    assert len(run.parts) == 1 and not run.frame.any()
+
+
+def test_maps_that_fit_in_two_ways_are_not_joined():
+    made, run = mapped("symmetric2+carried", 3)
+    assert map_events.kidnaps_score(run, made.kidnaps)["joined_false"] == 0.0
+
+
+def test_loops_that_close_are_closed_by_one_thing(carried):
+    made, run = carried
+    found = map_events.closures_score(run, made.scene.arena)
+    assert found["closures"] >= 10.0 and found["closures_right"] > 0.9 and found["closures_recall"] > 0.2
+    loops = run.touched.loops
+    assert (np.diff(loops["to"]) >= 0).all() and (loops["from"] < loops["to"]).all()
+    assert ((loops["probability"] > 0.0) & (loops["probability"] <= 1.0)).all()
+
+
+def test_closures_of_other_faces_are_counted_as_wrong(carried):
+    made, run = carried
+    loops = run.touched.loops.copy()
+    loops["from"] = np.roll(loops["from"], 3)
+    loops["from_x"], loops["from_y"] = np.roll(loops["from_x"], 3), np.roll(loops["from_y"], 3)
+    found = map_events.closures_score(replace(run, touched=replace(run.touched, loops=loops)), made.scene.arena)
+    assert found["closures_right"] < 0.7
+    none = replace(run, touched=replace(run.touched, loops=np.zeros(0, LOOP)))
+    assert map_events.closures_score(none, made.scene.arena)["closures_recall"] == 0.0
+
+
+def test_a_join_at_the_wrong_place_is_counted_as_false(carried):
+    made, run = carried
+    table = run.table.copy()
+    table["pose"][run.parts[1].joined :, 0] += 1.0
+    found = map_events.kidnaps_score(replace(run, table=table), made.kidnaps)
+    assert found["joined_false"] == 1.0 and found["joined"] == 0.0
+    assert map_events.kidnaps_score(run, (2900,))["alarms_false"] == 1.0
+
+
+def test_a_drive_is_located_in_the_map_that_the_robot_made():
+    _, run = mapped("anchor", 4)
+    (drive,) = own_map.score(run, "anchor", 4, 1)
+    assert drive.own.rows_to_lock is not None and drive.true.rows_to_lock is not None
+    assert drive.own.error_m < 0.06 and drive.true.error_m < 0.02
