@@ -199,7 +199,11 @@ def run(_build: Path, seeds: int = 30, workers: int = 1) -> None:
     found = sweep(one, jobs, folder, workers, "processes" if workers > 1 else "serial", "nav_active")
     by = {f: {p: [found[f"{f}_{p}_{s}"] for s in range(seeds)] for p in POLICIES} for f in FAMILIES}
     families = {f: {p: judged(runs, of["random"]) for p, runs in of.items()} for f, of in by.items()}
-    data = {"policies": list(POLICIES), "families": families, "plan_every_s": store.once(folder.with_name("every.json"), every)}
+    data = {
+        "policies": list(POLICIES),
+        "families": families,
+        "plan_every_s": store.once(folder.with_name("every.json"), every),
+    }
     data["cost"] = {"greedy": store.once(folder.with_name("cost.json"), lambda: cost(0))}
     store.write_result("nav_active", data)
     store.write_chart("nav_active", chart(data))
