@@ -9,6 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
 from benches.nav import bound as bounds  # noqa: E402
+
 from crunchbot_lab.scenes.closed import Loop  # noqa: E402
 
 
