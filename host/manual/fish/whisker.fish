@@ -302,6 +302,7 @@ complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subco
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l rows -d 'of a family'\''s scene (default: 3000)' -x
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l estimate -d 'judge these poses, in the frame of the first one, of any engine (docs/formats.md), in place of whisker map'\''s' -r
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l particles -d 'as whisker map'\''s' -x
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l own -d 'locate another drive in the map that was made, beside the true one'
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l out -d 'write the scene'\''s folder, for an engine of your own to run on' -r
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from map' -l json -d 'print the scores as one line of JSON'
 complete -c whisker -n '__fish_seen_subcommand_from texture; and not __fish_seen_subcommand_from train classify' -s h -d 'show this help message and exit'

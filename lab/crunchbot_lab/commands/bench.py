@@ -20,7 +20,7 @@ from crunchbot.nav.scoring import position_errors
 from crunchbot.scene import Scene, load
 from crunchbot.tables import TableError, unwritable
 
-from ..scenes import benchmark, map_scoring, write_scene
+from ..scenes import benchmark, map_events, map_scoring, own_map, write_scene
 from ..scenes.making import make
 from ..scenes.map_reading import read_map_folder
 
@@ -176,6 +176,9 @@ def _add_map(actions: Any) -> None:
     )
     p.add_argument("--estimate", metavar="EST.CSV", help=text)
     p.add_argument("--particles", type=whole_number(1, PARTICLES_MOST), metavar="N", help="as whisker map's")
+    p.add_argument(
+        "--own", action="store_true", help="locate another drive in the map that was made, beside the true one"
+    )
     p.add_argument("--out", metavar="DIR", help="write the scene's folder, for an engine of your own to run on")
     p.add_argument("--json", action="store_true", help="print the scores as one line of JSON")
 
@@ -239,4 +242,19 @@ def _map_scores(arguments: argparse.Namespace, scene: Scene, rows: Observations)
         return found | {f"odometry_{key}": value for key, value in beside.items()}
     robot, textures = replace(scene.robot, sensors=()), scene.arena.textures
     mapped = mapping.run(robot, textures, rows, particles=arguments.particles, quiet=arguments.json)
-    return map_scoring.score(mapped, scene.arena)
+    found = map_scoring.score(mapped, scene.arena) | map_events.closures_score(mapped, scene.arena)
+    found |= {"parts": float(len(mapped.parts)), "parts_joined": float(sum(p.joined is not None for p in mapped.parts))}
+    return found | (_own(mapped, arguments) if arguments.own else {})
+
+
+def _own(mapped: mapping.Mapped, arguments: argparse.Namespace) -> dict[str, float | None]:
+    """A drive in the map that was made, and the same in the true one."""
+    if Path(arguments.scene).is_dir():
+        raise BenchError(
+            f"bench map --own: {arguments.scene} is a folder; name a family, which more drives are drawn of"
+        )
+    found: dict[str, float | None] = {}
+    for drive in own_map.score(mapped, arguments.scene, arguments.seed):
+        for name, located in (("own", drive.own), ("true", drive.true)):
+            found |= {f"{name}_map_rows_to_lock": located.rows_to_lock, f"{name}_map_error_m": located.error_m}
+    return found
