@@ -6,6 +6,7 @@ Each run is a job whose figures are kept for the state of the mapper, the scenes
 """
 
 import argparse
+import math
 from pathlib import Path
 
 import matplotlib
@@ -13,13 +14,13 @@ import numpy as np
 
 from crunchbot.nav import mapping
 from crunchbot.nav.mapper import default_particles
-from crunchbot_lab.scenes import map_scoring
+from crunchbot_lab.scenes import map_events, map_scoring, own_map
 from crunchbot_lab.scenes.making import ROW_S, make
 from crunchbot_lab.scenes.sweep import sweep
 
 from .. import store
 from ..markdown import table
-from . import charts, own_maps
+from . import charts
 
 PAPER = ("anchor", "robot", "raw", "noisy")
 TABLES = {  # of the page: family -> rows
@@ -34,14 +35,13 @@ TABLES = {  # of the page: family -> rows
         3000,
     )
     | {"free": 18000},
+    "kidnapped": dict.fromkeys((f"{family}+carried" for family in PAPER), 3000),
 }
-OWN_SHARE, HARD_SHARE, LONG_SHARE = 2, 5, 20  # seeds of a family to one of an own map, a hard world, 30 minutes
+# Seeds of a family to one of a row of these tables, and to one of 30 minutes.
+SHARES, LONG_SHARE = {"hard": 5, "kidnapped": 2}, 20
 SWEPT, PARTICLES = ("anchor", "raw"), (1, 4, 12, 36)
 SWEEP_SEEDS = 3  # at most
-INPUTS = (
-    *("host/nav", "host/python/crunchbot/nav", "lab/crunchbot_lab/scenes"),
-    *("tools/benches/nav/maps.py", "tools/benches/nav/own_maps.py"),
-)
+INPUTS = ("host/nav", "host/python/crunchbot/nav", "lab/crunchbot_lab/scenes", "tools/benches/nav/maps.py")
 ROWS, FIRST_SEED = 3000, 500
 WORKERS = 2
 PAGE = store.ROOT / "docs/results/map.md"
@@ -58,13 +58,70 @@ COLUMNS = (  # title, key, factor, digits
     ("right, %", "tiles_right", 100, 1),
     ("us a row", "step_us_mean", 1, 0),
 )
+EVENTS = (
+    ("loops closed", "closures", 1, 0),
+    ("of one line of faces, %", "closures_right", 100, 1),
+    ("of one face, %", "closures_same", 100, 1),
+    ("meetings closed, %", "closures_recall", 100, 0),
+    ("us a row, 99 %", "step_us_p99", 1, 0),
+)
+SLOWER, WORSE = (
+    1.5,
+    1.3,
+)  # in the own map: times the rows to lock in the true one; times the root of both errors' squares
+OWN_MEDIANS = ("true_rows", "own_rows", "true_error_m", "own_error_m")
+OWN_HEAD = ["family", "runs", "locked, true map", "locked, own map", "in time", "rows, true", "rows, own"]
+OWN_HEAD += ["error, true, mm", "error, own, mm", "ratio"]
+KIDNAP_HEAD = ["family", "runs", "noticed", "joined", "falsely", "false alarms", "rows to notice", "rows to join"]
 
 
-def one(family: str, seed: int, rows: int = ROWS, **options) -> dict[str, float | None]:
-    """Figures of one run."""
+def one(family: str, seed: int, rows: int = ROWS, own: bool = False, **options) -> dict[str, float | None]:
+    """Figures of one run; `own`: also of a drive in the map that it left."""
     made = make(family, seed, rows)
-    mapped = mapping.run(made.scene.robot, made.scene.arena.textures, made.observations, seed, **options)
-    return map_scoring.score(mapped, made.scene.arena)
+    scene = made.scene
+    mapped = mapping.run(scene.robot, scene.arena.textures, made.observations, seed, **options)
+    if made.kidnaps:
+        return map_events.kidnaps_score(mapped, made.kidnaps)
+    found = map_scoring.score(mapped, scene.arena) | map_events.closures_score(mapped, scene.arena)
+    found |= map_events.kidnaps_score(mapped, ())
+    return found | (own_figures(own_map.score(mapped, family, seed)[0]) if own else {})
+
+
+def own_figures(drive: own_map.Drive) -> dict[str, float | None]:
+    """Of one drive: rows to lock and error from then on, in both maps; and the error of the poses that made the map."""
+    found = {"map_error_m": drive.map_error_m}
+    for name, located in (("own", drive.own), ("true", drive.true)):
+        found |= {f"{name}_rows": located.rows_to_lock, f"{name}_error_m": located.error_m}
+    return found
+
+
+def own_summed(runs: list[dict]) -> dict:
+    """Of drives in own maps: how many lock, and medians of those that lock in both maps."""
+    both = [run for run in runs if run["true_rows"] is not None and run["own_rows"] is not None]
+    ratios = [run["own_error_m"] / math.hypot(run["map_error_m"], run["true_error_m"]) for run in both]
+    return {
+        "runs": len(runs),
+        "locked_true": sum(run["true_rows"] is not None for run in runs),
+        "locked_own": sum(run["own_rows"] is not None for run in runs),
+        "in_time": sum(run["own_rows"] <= SLOWER * run["true_rows"] for run in both),
+        "error_ratio_median": _median(ratios),
+    } | {f"{name}_median": _median([run[name] for run in both]) for name in OWN_MEDIANS}
+
+
+def kidnaps_summed(runs: list[dict]) -> dict:
+    """Of runs with a kidnap: counts, and medians of rows."""
+    counts = {
+        "noticed": sum(run["noticed_rows"] is not None for run in runs),
+        "joined": sum(run["joined"] or 0 for run in runs),
+    }
+    counts |= {name: sum(run[name] for run in runs) for name in ("joined_false", "alarms_false")}
+    for name in ("noticed_rows", "joined_rows"):
+        counts[f"{name}_median"] = _median([run[name] for run in runs if run[name] is not None])
+    return {"runs": len(runs)} | counts
+
+
+def _median(values: list[float]) -> float | None:
+    return float(np.median(values)) if values else None
 
 
 def summed(runs: list[dict]) -> dict:
@@ -73,12 +130,13 @@ def summed(runs: list[dict]) -> dict:
     out = {key: float(np.median(values)) if values else None for key, values in known.items()}
     errors = [run["error_median_m"] for run in runs]
     worse = sum(run["error_median_m"] > run["odometry_error_median_m"] for run in runs)
-    return out | {"runs": len(runs), "error_worst_m": max(errors), "worse_than_odometry": worse}
+    alarms = sum(run["alarms_false"] for run in runs)
+    return out | {"runs": len(runs), "error_worst_m": max(errors), "worse_than_odometry": worse, "alarms": alarms}
 
 
 def seeds_of(table: str, rows: int, seeds: int) -> range:
     """Fewer of hard worlds and of long runs."""
-    share = LONG_SHARE if rows > ROWS else {"hard": HARD_SHARE, "own": OWN_SHARE}.get(table, 1)
+    share = LONG_SHARE if rows > ROWS else SHARES.get(table, 1)
     return range(FIRST_SEED, FIRST_SEED + max(1, seeds // share))
 
 
@@ -88,7 +146,8 @@ def measure(seeds: int, workers: int) -> dict:
         for family, rows in families.items():
             names = {f"{family}-{rows}-{seed}": {"seed": seed} for seed in seeds_of(title, rows, seeds)}
             parts[title, family] = list(names)
-            jobs |= {name: {"family": family, "rows": rows, **job} for name, job in names.items()}
+            own = {"own": True} if title == "families" and family in PAPER else {}
+            jobs |= {name: {"family": family, "rows": rows, **own, **job} for name, job in names.items()}
     sizes = [(f, p, lattice) for f in SWEPT for p in PARTICLES for lattice in (True, False)]
     for family, particles, lattice in sizes:
         few = range(FIRST_SEED, FIRST_SEED + min(seeds, SWEEP_SEEDS))
@@ -96,19 +155,14 @@ def measure(seeds: int, workers: int) -> dict:
         parts[family, particles, lattice] = list(names)
         options = {"family": family, "particles": particles, "lattice": lattice}
         jobs |= {name: options | job for name, job in names.items()}
-    mine = {
-        family: {f"own-{family}-{n}": {"family": family, "seed": n, "rows": ROWS} for n in seeds_of("own", ROWS, seeds)}
-        for family in PAPER
+    found = sweep(one, jobs, store.kept("map", *INPUTS), workers, label="map")
+    sums = {
+        key: (kidnaps_summed if key[0] == "kidnapped" else summed)([found[name] for name in names])
+        for key, names in parts.items()
     }
-    folder = store.kept("map", *INPUTS)
-    own = sweep(
-        own_maps.one, {n: j for jobs in mine.values() for n, j in jobs.items()}, folder, workers, label="own map"
-    )
-    found = sweep(one, jobs, folder, workers, label="map")
-    sums = {key: summed([found[name] for name in names]) for key, names in parts.items()}
     tables = {title: {f: sums[title, f] | {"rows": rows} for f, rows in t.items()} for title, t in TABLES.items()}
     swept = [{"family": f, "particles": p, "lattice": lattice, **sums[f, p, lattice]} for f, p, lattice in sizes]
-    own_sums = {family: own_maps.summed([own[name] for name in names]) for family, names in mine.items()}
+    own_sums = {family: own_summed([found[name] for name in parts["families", family]]) for family in PAPER}
     return {"rows": ROWS, "seeds": seeds, "sweep": swept, "own": own_sums, **tables}
 
 
@@ -149,10 +203,6 @@ def rows_of(found: dict[str, dict]) -> list[list[str]]:
     return out
 
 
-OWN_HEAD = ["family", "runs", "locked, true map", "locked, own map", "in time", "rows, true", "rows, own"]
-OWN_HEAD += ["error, true, mm", "error, own, mm", "ratio"]
-
-
 def own_rows(found: dict[str, dict]) -> list[list[str]]:
     """A row of the page a family."""
     out = []
@@ -164,11 +214,26 @@ def own_rows(found: dict[str, dict]) -> list[list[str]]:
     return out
 
 
+def event_rows(found: dict[str, dict]) -> list[list[str]]:
+    """A row of the page a family."""
+    out = []
+    for family, one_family in found.items():
+        cells = [_cell(one_family[key], factor, digits) for _, key, factor, digits in EVENTS]
+        out.append([family, *cells, f"{one_family['alarms']:.0f}"])
+    return out
+
+
+def kidnap_rows(found: dict[str, dict]) -> list[list[str]]:
+    """A row of the page a family."""
+    keys = ("runs", "noticed", "joined", "joined_false", "alarms_false", "noticed_rows_median", "joined_rows_median")
+    return [[family, *(_cell(one_family[key], 1, 0) for key in keys)] for family, one_family in found.items()]
+
+
 def page(data: dict) -> str:
     """docs/results/map.md."""
     titles = [title for title, *_ in COLUMNS]
     head = ["family", "runs", "wanted, mm", titles[0], "worst, mm", "odometry better in", *titles[1:]]
-    families, gyroscope, hard = (table(head, rows_of(data[title])) for title in TABLES)
+    families, gyroscope, hard = (table(head, rows_of(data[title])) for title in ("families", "gyroscope", "hard"))
     return (
         "# Maps by touch alone\n\n"
         "Generated by `tools/benches page` from `bench/results/map.json`, measured by `tools/benches map`: "
@@ -180,16 +245,23 @@ def page(data: dict) -> str:
         "within reach of the path. Tiles: places that a texture whisker visited.\n\n"
         "## No gyroscope\n\n"
         + families
+        + "\nLoops: a face touched again after a metre or more without it. Right: both touches are of one line of faces; a "
+        "meeting is closed when a right loop comes within 3 s.\n\n"
+        + table(["family", *(title for title, *_ in EVENTS), "kidnaps that were none"], event_rows(data["families"]))
         + "\n## With a gyroscope of 0.2 degrees a row\n\n"
         + gyroscope
         + "\n## Hard worlds\n\n"
         "`whisker scene make --list-families` says what each is. Where the floor has no tiles, or the wall no "
         "straight faces, tiles, faces and corners are judged against the fine tiles and boxes that stand for them; "
-        "after textures were renamed, by their first names.\n\n" + hard + "\n## In its own map\n\n"
-        f"A second drive of {own_maps.ROWS} rows from an unknown start within {own_maps.VISITED_M:g} m of the first one's "
-        f"path; the filter `{own_maps.FILTER}` in the map that the first drive left, and on the same rows in the true map. In "
-        f"time: at most {own_maps.SLOWER:g} times the rows. Ratio: error in the own map over the root of (error of the "
-        f"mapping poses squared + error in the true map squared), {own_maps.WORSE:g} wanted.\n\n"
+        "after textures were renamed, by their first names.\n\n" + hard + "\n## Kidnapped while mapping\n\n"
+        "Carried at least 0.8 m after half of the rows. Joined: at the end the poses are in the first map's frame. Falsely: "
+        "a median error beyond 0.3 m after a join.\n\n"
+        + table(KIDNAP_HEAD, kidnap_rows(data["kidnapped"]))
+        + "\n## In its own map\n\n"
+        f"A second drive of {own_map.ROWS} rows from an unknown start within {own_map.VISITED_M:g} m of the first one's "
+        f"path; the filter `{own_map.FILTER}` in the map that the first drive left, and on the same rows in the true map. In "
+        f"time: at most {SLOWER:g} times the rows. Ratio: error in the own map over the root of (error of the "
+        f"mapping poses squared + error in the true map squared), {WORSE:g} wanted.\n\n"
         + table(OWN_HEAD, own_rows(data["own"]))
         + "\n## Error against cost\n\n"
         "![error against cost by the number of hypotheses](../charts/map.svg)\n\n"

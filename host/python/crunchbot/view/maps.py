@@ -8,7 +8,7 @@ import numpy as np
 
 NAME_MOST = 40  # characters of a texture's name
 FREE_BELOW, NO_CELL = 20, 255  # per cent; a byte
-GROUPS = {"tiles": "tile_", "faces": "face_", "corners": "corner_"}  # of the sequences of a TouchMap
+GROUPS = {"tiles": "tile_", "faces": "face_", "corners": "corner_", "loops": "loop_"}  # of the sequences of a TouchMap
 
 
 def map_parts(touched: Any, grid: Any) -> dict:
@@ -16,7 +16,12 @@ def map_parts(touched: Any, grid: Any) -> dict:
     parts = {name: _rows(touched, before) for name, before in GROUPS.items()}
     lattice = [_real(value) for value in touched.lattice]
     names = [" ".join(name.split())[:NAME_MOST] for name in touched.textures]
-    shown = {"seq": touched.observation_seq, "textures": names, "lattice": lattice if lattice[3] > 0.0 else None}
+    shown = {
+        "seq": touched.observation_seq,
+        "part": touched.part,
+        "textures": names,
+        "lattice": lattice if lattice[3] > 0.0 else None,
+    }
     return shown | parts | {"grid": None if grid is None else _grid(grid)}
 
 

@@ -47,6 +47,7 @@ def examples() -> dict[str, object]:
         "touch_map": m.TouchMap(
             at,
             11,
+            1,
             ["VINYL", "ROUGH"],
             rng.random(4),
             np.array([-1, 0, 2], "i4"),
@@ -55,6 +56,7 @@ def examples() -> dict[str, object]:
             rng.random(3).astype("f4"),
             *(rng.random(4).astype("f4") for _ in range(7)),
             *(rng.random(2).astype("f4") for _ in range(3)),
+            *(rng.random(3).astype("f4") for _ in range(7)),
         ),
         "truth": m.PoseStamped(at, m.Pose.planar(0.5, 0.25, -1.0)),
         "health/pilot": m.ProcessHealth(at, "pilot", 4321, "running", [m.KeyValue("rows", "7")], "none yet"),

@@ -3,13 +3,23 @@
 import asyncio
 
 import chromium
+import numpy as np
 import pytest
 from patience import PATIENCE_S
 from viewkit import made_frames, ring_of
 from viewpage import DRAWN, looking_at
-from viewrobot import ARENA, SCENE, Clock, MadeUpRun, Post, belief_message, estimate, robot_view, route
+from viewrobot import ARENA, SCENE, Clock, MadeUpRun, Post, belief_message, estimate, robot_view, route, touch_map
 
-from crunchbot.robot.network.messages import Behaviour, Header, KeyValue, ProcessHealth, Time
+from crunchbot.robot.network.messages import (
+    Behaviour,
+    Header,
+    KeyValue,
+    MapMetaData,
+    OccupancyGrid,
+    Pose,
+    ProcessHealth,
+    Time,
+)
 from crunchbot.view.hub import Hub
 from crunchbot.view.robot import SILENT_S
 from crunchbot.view.server import serving
@@ -38,6 +48,10 @@ GREY = """(() => {
   const sum = (list) => list.reduce((a, b) => a + b, 0);
   return [sum(rows.map(sum)) / n / n, Math.max(...rows.map(sum)) / n];
 })()"""
+
+
+# Whether a line of this colour runs within 4 px of a place of the floor, beneath all that moves.
+FLOOR_SEEN = SEEN.replace("plan.live", "plan.floor")
 
 
 def place(script: str, x: float, y: float, colour: str = "") -> str:
@@ -142,9 +156,12 @@ def test_words_are_those_of_the_messages():
             hub.robot.take("behaviour", Behaviour(Header.at(0), "WHISK_IN", Time.of(20 * 10**9), "contact at <b>2</b>"))
             fault = ProcessHealth(Header.at(0), "bag", 99, "waiting", [KeyValue("bytes_written", "12")], "disk full")
             hub.robot.take("health/bag", fault)
+            expects = KeyValue("expects", "3.2 bits in 12.0 s: turn -120 degrees, drive 1.2 m")
+            hub.robot.take("health/pilot", ProcessHealth(Header.at(0), "pilot", 98, "running", [expects]))
             await b.until(DRAWN)
             await b.until("$('processes').innerText.includes('bag')")
             doing = await b.text("#behaviour")
+            assert "Expects to learn" in doing and "3.2 bits in 12.0 s: turn -120 degrees, drive 1.2 m" in doing
             assert "whisk in" in doing and "contact at <b>2</b>" in doing and "5.4 s" in doing
             processes = await b.text("#processes")
             assert (
@@ -297,5 +314,35 @@ def test_a_pose_is_reported_by_a_drag_on_the_plan_or_by_numbers():
         async with looking_at(Post(), may_set_pose=False) as (b, _):
             await b.until("linked")
             assert not await b.eval("$('set-pose').checkVisibility()")
+
+    asyncio.run(scenario())
+
+
+def test_a_map_takes_the_arenas_place_with_what_was_felt():
+    post = Post()
+    cells = np.full((40, 60), -1, "i1")
+    cells[10:30, 10:50] = 0
+    info = MapMetaData(0.05, 60, 40, Pose.planar(-1.0, -1.0, 0.0))
+    face = (0.25, -0.5, 0.25, 0.75, np.pi, 0.01, 0.01)
+
+    async def scenario():
+        async with looking_at(post) as (b, _):
+            await b.until("robotPart.drawn && robotPart.scene")
+            assert await b.eval("$('map-card').hidden") and await b.text("#plan-title") == "Arena from above"
+            post.put("map", OccupancyGrid(Header.at(0), info, cells.ravel()))
+            loop = (12.0, 4.0, 0.2, 0.5, 0.2, -0.25, 1.0)
+            post.put("touch_map", touch_map(tiles=[(0, 0, 1, 0.95), (1, 0, 0, 0.5)], faces=[face], loops=[loop]))
+            said = await b.until("!$('map-card').hidden && $('map').innerText")
+            assert "1 stretches of faces" in said and "2 felt, 1 sure" in said and "2.0 m² free" in said
+            assert "1, the last at 12.0 s with a face touched 8.0 s before" in said and "the first" in said
+            assert await b.text("#plan-title") == "Map from above" and await b.eval("$('obstacle-legend').hidden")
+            assert await b.eval("robotPart.plan.bounds") == [-1.0, -1.0, 2.0, 1.0]
+            good, bad = await colour(b, "--good"), await colour(b, "--bad")
+            assert await b.eval(place(FLOOR_SEEN, 0.25, 0.0, good)) and not await b.eval(
+                place(FLOOR_SEEN, 0.6, 0.0, good)
+            )
+            assert await b.eval(place(FLOOR_SEEN, 0.2, 0.5, bad)) and not await b.eval(
+                place(FLOOR_SEEN, -0.5, 0.5, bad)
+            )
 
     asyncio.run(scenario())

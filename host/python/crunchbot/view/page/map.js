@@ -4,12 +4,15 @@ const DEVIATIONS = 2; // of faces and corners, that are shown
 const BAND_LEAST = 1.5; // px, half of the band about a face
 const STEP_FIT_M = 0.5; // of what the plan shows, so that it seldom moves
 const NO_CELL = 255;
+const LOOPS_STRONG = 6; // the newest; older ones are as faint as
+const LOOP_FAINT = 0.25;
 
 class MapLayer {
   constructor(plan) { this.plan = plan; }
 
   /* { textures, lattice: [x, y, turn, pitch] or null, tiles: [column, row, texture, probability], faces: [x0, y0, x1, y1, normal, its sd,
-   * offset's sd], corners: [x, y, sd], grid: { x, y, turn, cell, columns, rows, cells: base64 of bytes, per cent or NO_CELL } or null }. */
+   * offset's sd], corners: [x, y, sd], loops: [t, t then, x, y, x then, y then,
+   * probability], grid: { x, y, turn, cell, columns, rows, cells: base64 of bytes, per cent or NO_CELL } or null }. */
   draw(pen, map) {
     this.pen = pen;
     if (map.grid) this.occupancy(map.grid);
@@ -17,6 +20,26 @@ class MapLayer {
     for (const face of map.faces) this.band(face);
     for (const face of map.faces) this.line(face);
     for (const corner of map.corners) this.corner(corner);
+    map.loops.forEach((loop, n) => this.loop(loop, map.loops.length - 1 - n));
+  }
+
+  /* Where a face was touched again: a line from where it had been touched, fainter for those before. */
+  loop([, , x, y, fromX, fromY], before) {
+    const { plan, pen } = this;
+    pen.globalAlpha = Math.max(LOOP_FAINT, 1 - before / LOOPS_STRONG);
+    pen.strokeStyle = pen.fillStyle = plan.css('--bad');
+    pen.lineWidth = 1.6 * plan.ratio;
+    pen.setLineDash([3 * plan.ratio, 3 * plan.ratio]);
+    pen.beginPath();
+    pen.moveTo(plan.x(fromX), plan.y(fromY));
+    pen.lineTo(plan.x(x), plan.y(y));
+    pen.stroke();
+    pen.setLineDash([]);
+    pen.beginPath();
+    pen.arc(plan.x(x), plan.y(y), (before ? 3 : 5) * plan.ratio, 0, 2 * Math.PI);
+    if (before) pen.stroke();
+    else pen.fill();
+    pen.globalAlpha = 1;
   }
 
   occupancy({ x, y, turn, cell, columns, rows, cells }) {
@@ -114,5 +137,7 @@ function mapSaid(map) {
   const faces = map.faces.length ? `${map.faces.length} stretches of faces, half of them to ± ${signed(1000 * off[Math.floor(off.length / 2)], 0)} mm` : 'no face yet';
   const tiles = map.lattice ? `tiles of ${signed(map.lattice[3], 3)} m, ${map.tiles.length} felt, ${sure} sure` : 'no tiles found in the floor';
   const area = map.grid ? `${signed(map.grid.free_m2, 1)} m² free` : 'nothing known to be free';
-  return { faces, tiles, area, corners: `${map.corners.length}` };
+  const last = map.loops.at(-1);
+  const loops = last ? `${map.loops.length}, the last at ${signed(last[0], 1)} s with a face touched ${duration(last[0] - last[1])} before` : 'none closed yet';
+  return { faces, tiles, area, loops, corners: `${map.corners.length}` };
 }

@@ -35,16 +35,18 @@ function tellPose(word, belief) {
 }
 
 function tellMap(map) {
-  const { faces, tiles, area, corners } = mapSaid(map);
-  pairsOf($('map'), [['Faces', faces], ['Corners', corners], ['Floor', tiles], ['Ground', area], ['As of row', count(map.seq)]]);
+  const { faces, tiles, area, corners, loops } = mapSaid(map);
+  pairsOf($('map'), [['Faces', faces], ['Corners', corners], ['Loops', loops], ['Floor', tiles], ['Ground', area], ['As of row', count(map.seq)], ['Part of the run', map.part ? `${map.part + 1}, after ${map.part === 1 ? 'a kidnap' : `${map.part} kidnaps`}` : 'the first']]);
 }
 
 function tellBehaviour(word) {
   const doing = word.behaviour;
+  const expects = word.processes.find((process) => process.name === 'pilot')?.counters.expects; // of one that plans
   pairsOf($('behaviour'), [
     ['State', doing ? words(doing.state.toLowerCase()) : 'not known: no word has come'],
     ['For', doing && word.now_s !== null ? duration(Math.max(0, word.now_s - doing.since_s)) : 'not known'],
     ['Because', doing ? doing.reason || 'no reason reported' : 'not known'],
+    ...(expects ? [['Expects to learn', expects]] : []),
   ]);
 }
 
