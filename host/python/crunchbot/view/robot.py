@@ -272,8 +272,11 @@ class RobotModel:
             process.ended, process.state = True, text(f"ended: {reported.reason}" if reported.reason else "ended")
 
     def health(self) -> list[dict]:
-        """Every process, by name, with its age in whole seconds."""
-        return [self._process(name, process) for name, process in sorted(self.processes.items())]
+        """Every process, by name, with its age in whole seconds; but for a navigator whose place a mapper has taken."""
+        known = dict(sorted(self.processes.items()))
+        if MAPPER in known and known["navigator"].heard is None:
+            del known["navigator"]
+        return [self._process(name, process) for name, process in known.items()]
 
     def _process(self, name: str, process: Process) -> dict:
         age = None if process.heard is None else self._clock() - process.heard

@@ -391,6 +391,9 @@ def test_a_mappers_map_is_shown_and_the_truth_in_its_frame():
     grid = shown["grid"]
     assert list(base64.b64decode(grid["cells"])) == [255, 0, 50, 99, 100, 1]
     assert (grid["columns"], grid["rows"], grid["x"], grid["y"]) == (3, 2, -0.5, 0.25)
+    assert [process["name"] for process in model.health()] == ["navigator", "pilot"]
+    model.take("health/mapper", ProcessHealth(Header.at(0), "mapper", 7, "running"))
+    assert [process["name"] for process in model.health()] == ["mapper", "pilot"]
     model.begin_anew()
     feed._due = 0.0
     assert json.loads(feed.take()) == {"topic": "map", "map": None}
