@@ -51,7 +51,7 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
 }
 # Options of the topics whose full size takes more than some minutes, as `make bench` gives them.
 ROUND = {
-    "map": ["--seeds", "60"],
+    "map": ["--seeds", "50"],
     "nav": ["--seeds", "20"],
     "nav_peers": ["--seeds", "20"],
     "nav_size": ["--seeds", "10"],
