@@ -22,12 +22,8 @@ from crunchbot.robot.processes.children import Child, Program
 from ..report.run import FILTERS
 
 FOLLOWERS = 2  # whisker-log and the pilot
-BATCH = (
-    16  # frames of a USB transfer, the most: in lock-step nobody waits, and each transfer costs two processes a wake-up
-)
 POLL_S = 0.05
-LAGGARD_S = 20.0  # for the readers to end after the simulation has; or
-LAGGARD_SHARE = 0.25  # of the wall time until then, for what a filter on a busy machine is behind grows with the run
+LAGGARD_S = 20.0  # for the readers to end after the simulation has
 
 
 class ChainError(RuntimeError):
@@ -117,7 +113,7 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
             command = (*run.before.get(program.name, ()), *program.command)
             child = Child(replace(program, command=command), run.logs / f"{program.name}.log")
             children.append(stack.enter_context(closing(child)))
-        _await_end(children, began)
+        _await_end(children)
     return time.monotonic() - began
 
 
@@ -129,7 +125,7 @@ def _bridge(run: ChainRun, table: parts.Table) -> Program:
     simulation += ["--faults", run.out / "faults.csv", "--usb-faults", run.out / "usb_faults.csv"]
     simulation += ["--speed-report", run.out / "speed.json"]
     simulation += ["--rtl-seconds", run.rtl_seconds] if run.level == "mixed" else []
-    daemon = [*table.daemon(), "--batch", BATCH, "--sck-divider", run.link.sck_divider]
+    daemon = [*table.daemon(), "--sck-divider", run.link.sck_divider]
     daemon += ["--word-gap", run.link.word_gap, "--sample-point", run.link.sample_point]
     return Program.of(parts.BRIDGE, [*simulation, "--", *daemon])
 
@@ -189,14 +185,13 @@ def _await_file(path: Path, bridge: Child) -> None:
         time.sleep(POLL_S)
 
 
-def _await_end(children: list[Child], began: float) -> None:
-    """Wait for all but those that serve; the readers must follow the simulation's end soon. `began`: monotonic, s."""
+def _await_end(children: list[Child]) -> None:
+    """Wait for all but those that serve; the readers must follow the simulation's end soon."""
     give_up = None
     while any(child.running and not child.program.serves for child in children):
         _raise_failures(children)
         if give_up is None and not children[0].running:
-            ended = time.monotonic()
-            give_up = ended + max(LAGGARD_S, LAGGARD_SHARE * (ended - began))
+            give_up = time.monotonic() + LAGGARD_S
         if give_up is not None and time.monotonic() > give_up:
             late = next(child for child in children if child.running and not child.program.serves)
             raise ChainError(f"{late.name} did not end with the run; log: {late.log}")

@@ -218,8 +218,8 @@ def test_a_failure_of_who_ends_last_is_reported_too():
         return SimpleNamespace(running=False, program=program, failed=failed, ended_s=1.0, failure=lambda: "bag failed")
 
     with pytest.raises(ChainError, match="bag failed"):
-        _await_end([ended(False), ended(True)], began=0.0)
-    _await_end([ended(False), ended(False)], began=0.0)
+        _await_end([ended(False), ended(True)])
+    _await_end([ended(False), ended(False)])
 
 
 @pytest.mark.parametrize(
