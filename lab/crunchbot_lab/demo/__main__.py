@@ -14,6 +14,7 @@ import numpy as np
 from tqdm import tqdm
 
 from crunchbot import scene as scenes
+from crunchbot.arguments import whole_number
 from crunchbot.nav import localise
 from crunchbot.stopping import interrupt_on_signals
 from crunchbot.tables import TableError
@@ -35,7 +36,10 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m crunchbot_lab.demo", description=__doc__)
     add_run_options(parser, Path("build/demo"), 60.0)
     parser.add_argument(
-        "--spread", type=int, default=8, help="seeds from this one on that are replayed without bits (%(default)s)"
+        "--spread",
+        type=whole_number(1),
+        default=8,
+        help="seeds from this one on that are replayed without bits (%(default)s)",
     )
     parser.add_argument(
         "--level",

@@ -252,6 +252,12 @@ def test_the_nodes_link_is_set_by_options_and_else_the_fastest():
     assert (divider, gap) == (LIMITS["sck_divider_min"], LIMITS["word_gap_min"]) and 1 <= sample <= divider
 
 
+def test_a_spread_of_no_seed_is_refused_in_one_line(capsys):
+    with pytest.raises(SystemExit):
+        parse(["--spread", "0"])
+    assert "argument --spread: '0' is not a whole number of 1 or more" in capsys.readouterr().err
+
+
 def running_with(word):
     """Processes whose command line holds `word`."""
     found = []
