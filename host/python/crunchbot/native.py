@@ -14,16 +14,21 @@ try:
 except ImportError as error:  # a source tree that has not been built
     raise ImportError("whisker: the compiled module is missing or stale; run 'make build'") from error
 
-__all__ = ["as_doubles", "doubles", "ffi", "lib", "octets", "pointer"]
+__all__ = ["as_doubles", "doubles", "ffi", "floats", "lib", "octets", "pointer"]
 
 Shape = tuple[int | None, ...]  # None: any length
-DOUBLE, OCTET = np.dtype(np.float64), np.dtype(np.uint8)
-DOUBLES, OCTETS = ffi.typeof("double[]"), ffi.typeof("uint8_t[]")
+DOUBLE, FLOAT, OCTET = np.dtype(np.float64), np.dtype(np.float32), np.dtype(np.uint8)
+DOUBLES, FLOATS, OCTETS = ffi.typeof("double[]"), ffi.typeof("float[]"), ffi.typeof("uint8_t[]")
 
 
 def doubles(array: np.ndarray, name: str, shape: Shape) -> ffi.CData:
     """`pointer` to float64."""
     return pointer(DOUBLES, DOUBLE, array, name, shape)
+
+
+def floats(array: np.ndarray, name: str, shape: Shape) -> ffi.CData:
+    """`pointer` to float32."""
+    return pointer(FLOATS, FLOAT, array, name, shape)
 
 
 def octets(array: np.ndarray, name: str, shape: Shape) -> ffi.CData:

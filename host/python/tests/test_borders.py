@@ -22,6 +22,9 @@ from crunchbot.native import as_doubles, doubles, ffi, lib, octets
 from crunchbot.nav.filters import COMPONENT, Filter, Sensor, pack, prior_fault
 from crunchbot.nav.mapper import Mapper
 from crunchbot.nav.weigher import Weigher
+from crunchbot.planning.actions import Vehicle
+from crunchbot.planning.ground import ArenaMap, Ground
+from crunchbot.planning.planner import Past, Planner
 from crunchbot.touch.contact import Contact
 from crunchbot.touch.contact_filter import ContactFilter
 from crunchbot.touch.radial.model import RadialModel, peak
@@ -35,13 +38,14 @@ from crunchbot.touch.texture.spectral import forward
 from crunchbot_lab import signals
 
 PACKAGE = Path(crunchbot.__file__).parent
-HELPERS = {"doubles", "octets", "pointer"}
+HELPERS = {"doubles", "floats", "octets", "pointer"}
 AROUND = {"cast", "from_buffer", "ctypes"}  # ways around the helpers
 # Functions that hand over only arrays of their own making.
 OWN = {
     "nav.filters.Filter.bins",
     "nav.filters.problem_of",
-    "nav.mapper.Mapper.map",
+    "nav.mapper.Mapper._grid",
+    "nav.mapper.Mapper._listed",
     "touch.radial.shape.terms_of",
     "signals.world.World.run",
     "signals.mechanics._counts",
@@ -89,6 +93,8 @@ COMPONENTS["pose"], COMPONENTS["sigma_m"], COMPONENTS["sigma_rad"], COMPONENTS["
 PLAIN = TextureModel.train({"A": [NOISE], "B": [3.0 * NOISE]})
 WHISK = {"t_s": np.arange(64.0), "samples": NOISE[:64], "whisk_rad_s": np.ones(64), "reported_rad_s": np.ones(64)}
 PUSH = {"bases": np.zeros((8, 3)), "tilts": np.zeros((8, 2)), "good": np.ones(8, bool)}
+GROUND, VEHICLE = Ground.of(ArenaMap(SCENE.arena), SCENE.robot), Vehicle(0.15, 0.71, 0.5, 4.0, 0.25)
+PAST = {"met": np.zeros((2, 2)), "been": np.zeros((3, 3))}
 BLOCK = {"ticks": np.arange(8), "samples": NOISE[:8], "good": np.ones(8, bool)}
 
 CASES = {
@@ -116,6 +122,15 @@ CASES = {
         {"odometry": (0,), "texture": (0, 1), "radial_m": (0,)},
     ),
     "nav.weigher.Weigher.weigh": of_one(Weigher(SCENE).weigh, "poses", np.zeros((4, 3)), 1),
+    "planning.planner._ground": Case(
+        lambda **cells: Planner(dataclasses.replace(GROUND, **cells), VEHICLE),
+        {"texture": GROUND.texture, "clear_m": GROUND.clear_m},
+        {"texture": (0, 1), "clear_m": (0, 1)},
+    ),
+    "planning.planner.Planner.plan": Case(
+        lambda **past: Planner(GROUND, VEHICLE).plan(COMPONENTS, Past(**past)), PAST, {"met": (1,), "been": (1,)}
+    ),
+    "planning.planner.Planner.whisk": of_one(Planner(GROUND, VEHICLE).whisk, "components", COMPONENTS),
     "touch.contact.Contact.block": Case(
         lambda **block: Contact().block(*block.values()), BLOCK, {"ticks": (0,), "samples": (0, 1), "good": (0,)}
     ),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import UserError
-from ..native import doubles, ffi, lib, pointer
+from ..native import doubles, ffi, floats, lib, pointer
 from ..scene import Arena, Robot, Scene
 from .filters import ESTIMATE, ESTIMATES, pack, problem_of
 from .observations import Observations
@@ -193,7 +193,7 @@ class Mapper:
     def _grid(self) -> Grid:
         grid = self._function("grid")(self._mapper)
         occupied = np.zeros((grid.rows, grid.columns), np.float32)
-        self._function("occupancy")(self._mapper, ffi.cast("float *", ffi.from_buffer(occupied)))
+        self._function("occupancy")(self._mapper, floats(occupied, "occupied", occupied.shape))
         return Grid(grid.x, grid.y, grid.cell, occupied)
 
     def _tiles(self) -> Iterator[tuple[tuple[int, int], tuple[int, float]]]:

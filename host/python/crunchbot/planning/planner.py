@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..native import as_doubles, doubles, ffi, lib, octets, pointer
+from ..native import as_doubles, doubles, ffi, floats, lib, octets
 from .actions import Path, Vehicle, all_round
 from .ground import Ground
 
@@ -22,7 +22,6 @@ FLOOR_BITS = 0.1  # an action that is expected to yield less is not worth its ti
 NOTHING_TOLD = "no place reads otherwise than another"
 KNOWN = "no reading in reach is expected to yield 0.1 bits"
 SHUT_IN = "what was met lately is in every way"
-FLOATS, FLOAT = ffi.typeof("float[]"), np.dtype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -152,12 +151,12 @@ def _step(step) -> tuple:
 
 
 def _ground(ground: Ground):
-    rows, columns = ground.texture.shape
     texture, clear = np.ascontiguousarray(ground.texture), np.ascontiguousarray(ground.clear_m)
+    classes = octets(texture, "texture", (None, None))
+    rows, columns = texture.shape
     out = ffi.new("struct nav_planner_ground *", {"rows": rows, "columns": columns, "cell": ground.cell_m})
     out.x = out.y = ground.corner_m
-    out.texture = octets(texture, "texture", (rows, columns))
-    out.clear = pointer(FLOATS, FLOAT, clear, "clear_m", (rows, columns))
+    out.texture, out.clear = classes, floats(clear, "clear_m", (rows, columns))
     return out, (texture, clear)
 
 
