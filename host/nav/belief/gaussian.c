@@ -30,6 +30,28 @@ void nav_gaussian_estimate(const struct nav_gaussian *g, struct nav_estimate *es
     estimate->confidence = nav_gaussian_mass(g, NAV_NEAR_M, NAV_NEAR_RAD);
 }
 
+void nav_gaussian_sum_add(struct nav_gaussian_sum *s, double mass, const struct nav_gaussian *g)
+{
+    const double off[3] = {g->mean.x - s->about.x, g->mean.y - s->about.y, nav_wrap(g->mean.theta - s->about.theta)};
+    s->mass += mass;
+    for (int r = 0; r < 3; r++)
+        s->first[r] += mass * off[r];
+    for (int r = 0; r < 9; r++)
+        s->second[r] += mass * (g->covariance[r] + off[r / 3] * off[r % 3]);
+}
+
+struct nav_gaussian nav_gaussian_sum_moments(const struct nav_gaussian_sum *s)
+{
+    struct nav_gaussian g;
+    double mean[3];
+    for (int r = 0; r < 3; r++)
+        mean[r] = s->first[r] / s->mass;
+    for (int r = 0; r < 9; r++)
+        g.covariance[r] = s->second[r] / s->mass - mean[r / 3] * mean[r % 3];
+    g.mean = (struct nav_pose){s->about.x + mean[0], s->about.y + mean[1], nav_wrap(s->about.theta + mean[2])};
+    return g;
+}
+
 void nav_gaussian_ahead(const struct nav_gaussian *g, const struct nav_pending *pending, struct nav_estimate *estimate)
 {
     struct nav_gaussian now = *g;

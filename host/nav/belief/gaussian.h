@@ -37,6 +37,17 @@ struct nav_gaussian nav_gaussian_uniform(const struct nav_arena *);
 /* Pose, covariance and confidence of a Gaussian belief. */
 void nav_gaussian_estimate(const struct nav_gaussian *, struct nav_estimate *);
 
+/* A mixture of Gaussians, summed one by one. Headings are taken relative to `about`, which the caller sets, near the
+ * mixture's mean. */
+struct nav_gaussian_sum {
+    struct nav_pose about;
+    double mass, first[3], second[9];
+};
+void nav_gaussian_sum_add(struct nav_gaussian_sum *, double mass, const struct nav_gaussian *);
+
+/* Mean and covariance of the mixture; its mass must be above 0. */
+struct nav_gaussian nav_gaussian_sum_moments(const struct nav_gaussian_sum *);
+
 /* Pose and covariance once the motion put off is done. */
 void nav_gaussian_ahead(const struct nav_gaussian *, const struct nav_pending *, struct nav_estimate *);
 

@@ -22,13 +22,24 @@ struct nav_row nav_rows_at(const struct nav_rows *rows, long at)
                             .own = rows->own ? rows->own + at * rows->own_width : NULL};
 }
 
-void nav_replay(struct nav_filter *filter, const struct nav_rows *rows, long first, long count,
-                struct nav_estimate *out, double *step_us)
+void nav_replay_steps(nav_step *step, void *estimator, const struct nav_rows *rows, long first, long count,
+                      struct nav_estimate *out, double *step_us)
 {
     for (long k = 0; k < count; k++) {
         struct nav_row row = nav_rows_at(rows, first + k);
         double begun = replay_now_us();
-        nav_filter_step(filter, &row, &out[k]);
+        step(estimator, &row, &out[k]);
         step_us[k] = replay_now_us() - begun;
     }
+}
+
+static void replay_filter(void *filter, const struct nav_row *row, struct nav_estimate *out)
+{
+    nav_filter_step(filter, row, out);
+}
+
+void nav_replay(struct nav_filter *filter, const struct nav_rows *rows, long first, long count,
+                struct nav_estimate *out, double *step_us)
+{
+    nav_replay_steps(replay_filter, filter, rows, first, count, out, step_us);
 }

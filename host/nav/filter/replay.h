@@ -34,6 +34,14 @@ void nav_replay(struct nav_filter *, const struct nav_rows *, long first, long c
 struct nav_row nav_rows_at(const struct nav_rows *, long row);
 
 #pragma GCC visibility pop
+
+/* A step of any estimator: a filter's, a mapper's. */
+typedef void nav_step(void *estimator, const struct nav_row *, struct nav_estimate *);
+
+/* nav_replay for any estimator. */
+void nav_replay_steps(nav_step *, void *estimator, const struct nav_rows *, long first, long count,
+                      struct nav_estimate *out, double *step_us);
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,10 +1,8 @@
-#define _POSIX_C_SOURCE 200809L /* clock_gettime */
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "gaussian.h"
 #include "kidnap.h"
 
 static const double SCALE_LEAST = 0.3, SCALE_MOST = 1.5; /* of the odometry's noise */
@@ -158,31 +156,22 @@ static void mapper_refuse(struct nav_mapper *m)
 static void mapper_estimate(const struct nav_mapper *m, struct nav_estimate *out)
 {
     const struct nav_particle_map *best = nav_mapper_best(m);
-    const double *centre = best->joint.mean;
-    double total = 0.0, mean[3] = {0.0}, square[9] = {0.0};
+    struct nav_gaussian_sum sum = {.about = nav_particle_map_pose(best)};
     for (int n = 0; n < m->options.particles; n++) {
         const struct nav_joint *j = &m->particle[n].joint;
-        double weight = exp(m->particle[n].evidence - best->evidence), off[3];
-        total += weight;
-        for (int r = 0; r < 3; r++) {
-            off[r] = r < 2 ? j->mean[r] - centre[r] : nav_wrap(j->mean[r] - centre[r]);
-            mean[r] += weight * off[r];
-        }
+        struct nav_gaussian g = {.mean = nav_particle_map_pose(&m->particle[n])};
         for (int r = 0; r < 9; r++)
-            square[r] += weight * (j->cov[r / 3 * j->room + r % 3] + off[r / 3] * off[r % 3]);
+            g.covariance[r] = j->cov[r / 3 * j->room + r % 3];
+        nav_gaussian_sum_add(&sum, exp(m->particle[n].evidence - best->evidence), &g);
     }
-    for (int r = 0; r < 9; r++)
-        out->covariance[r] = square[r] / total - mean[r / 3] * mean[r % 3] / (total * total);
-    out->pose = (struct nav_pose){centre[0] + mean[0] / total, centre[1] + mean[1] / total,
-                                  nav_wrap(centre[2] + mean[2] / total)};
+    struct nav_gaussian all = nav_gaussian_sum_moments(&sum);
+    nav_gaussian_estimate(&all, out);
 }
 
 static void mapper_answer(const struct nav_mapper *m, struct nav_estimate *out)
 {
     *out = (struct nav_estimate){.states = m->options.particles, .touched = m->options.particles};
     mapper_estimate(m, out);
-    double place = fmax((out->covariance[0] + out->covariance[4]) / 2.0, 1e-12), turn = fmax(out->covariance[8], 1e-12);
-    out->confidence = (1.0 - exp(-0.5 * NAV_NEAR_M * NAV_NEAR_M / place)) * erf(NAV_NEAR_RAD / sqrt(2.0 * turn));
     out->evaluations = m->options.particles + (m->challenged ? CATCH_UP : 0);
     out->bytes = (size_t)m->options.particles * nav_particle_map_bytes(m->record.classes) +
                  nav_record_bytes(&m->record) + nav_kidnap_bytes(&m->record);
@@ -225,22 +214,15 @@ void nav_mapper_step(struct nav_mapper *m, const struct nav_row *row, struct nav
     mapper_answer(m, out);
 }
 
-static double mapper_now_us(void)
+static void mapper_step(void *mapper, const struct nav_row *row, struct nav_estimate *out)
 {
-    struct timespec t = {0, 0};
-    (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
+    nav_mapper_step(mapper, row, out);
 }
 
 void nav_mapper_replay(struct nav_mapper *m, const struct nav_rows *rows, long first, long count,
                        struct nav_estimate *out, double *step_us)
 {
-    for (long k = 0; k < count; k++) {
-        struct nav_row row = nav_rows_at(rows, first + k);
-        double begun = mapper_now_us();
-        nav_mapper_step(m, &row, &out[k]);
-        step_us[k] = mapper_now_us() - begun;
-    }
+    nav_replay_steps(mapper_step, m, rows, first, count, out, step_us);
 }
 
 uint64_t nav_mapper_bad_cells(const struct nav_mapper *m)

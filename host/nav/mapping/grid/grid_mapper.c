@@ -1,12 +1,10 @@
-#define _POSIX_C_SOURCE 200809L /* clock_gettime */
-
 #include "grid_mapper.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "gaussian.h"
 #include "grid_particle.h"
 #include "grid_view.h"
 
@@ -198,23 +196,17 @@ static struct nav_noise grid_lost(const struct nav_grid_mapper *m, const struct 
 
 static void grid_estimate(const struct nav_grid_mapper *m, struct nav_estimate *out)
 {
-    double best = grid_best(m)->weight, total = 0.0, mean[3] = {0.0}, square[9] = {0.0}, centre[3];
-    memcpy(centre, grid_best(m)->now.mean, sizeof centre);
+    const struct nav_grid_particle *best = grid_best(m);
+    struct nav_gaussian_sum sum = {.about = {best->now.mean[0], best->now.mean[1], best->now.mean[2]}};
     for (int n = 0; n < m->particles; n++) {
-        const struct nav_grid_gaussian *g = &m->particle[n].now;
-        double weight = exp(m->particle[n].weight - best), off[3];
-        total += weight;
-        for (int r = 0; r < 3; r++) {
-            off[r] = r < 2 ? g->mean[r] - centre[r] : nav_wrap(g->mean[r] - centre[r]);
-            mean[r] += weight * off[r];
-        }
+        const struct nav_grid_gaussian *p = &m->particle[n].now;
+        struct nav_gaussian g = {.mean = {p->mean[0], p->mean[1], p->mean[2]}};
         for (int r = 0; r < 9; r++)
-            square[r] += weight * (g->cov[r / 3][r % 3] + off[r / 3] * off[r % 3]);
+            g.covariance[r] = p->cov[r / 3][r % 3];
+        nav_gaussian_sum_add(&sum, exp(m->particle[n].weight - best->weight), &g);
     }
-    for (int r = 0; r < 9; r++)
-        out->covariance[r] = square[r] / total - mean[r / 3] * mean[r % 3] / (total * total);
-    out->pose = (struct nav_pose){centre[0] + mean[0] / total, centre[1] + mean[1] / total,
-                                  nav_wrap(centre[2] + mean[2] / total)};
+    struct nav_gaussian all = nav_gaussian_sum_moments(&sum);
+    nav_gaussian_estimate(&all, out);
 }
 
 static void grid_take(struct nav_grid_mapper *m, const struct nav_record_row *row)
@@ -241,28 +233,19 @@ void nav_grid_mapper_step(struct nav_grid_mapper *m, const struct nav_row *row, 
     grid_take(m, &taken);
     *out = (struct nav_estimate){.states = m->particles, .touched = m->particles, .evaluations = m->particles};
     grid_estimate(m, out);
-    double place = fmax((out->covariance[0] + out->covariance[4]) / 2.0, 1e-12), turn = fmax(out->covariance[8], 1e-12);
-    out->confidence = (1.0 - exp(-0.5 * NAV_NEAR_M * NAV_NEAR_M / place)) * erf(NAV_NEAR_RAD / sqrt(2.0 * turn));
     out->bytes =
         nav_grid_pool_bytes(&m->pool) + 2 * (size_t)m->particles * sizeof *m->particle + nav_record_bytes(&m->record);
 }
 
-static double grid_now_us(void)
+static void grid_step(void *mapper, const struct nav_row *row, struct nav_estimate *out)
 {
-    struct timespec t = {0, 0};
-    (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
+    nav_grid_mapper_step(mapper, row, out);
 }
 
 void nav_grid_mapper_replay(struct nav_grid_mapper *m, const struct nav_rows *rows, long first, long count,
                             struct nav_estimate *out, double *step_us)
 {
-    for (long k = 0; k < count; k++) {
-        struct nav_row row = nav_rows_at(rows, first + k);
-        double begun = grid_now_us();
-        nav_grid_mapper_step(m, &row, &out[k]);
-        step_us[k] = grid_now_us() - begun;
-    }
+    nav_replay_steps(grid_step, m, rows, first, count, out, step_us);
 }
 
 double nav_grid_mapper_evidence(const struct nav_grid_mapper *m)
