@@ -22,7 +22,12 @@ ALLOWED = {
     "host/nav/field": ["host/nav/problem", "host/nav/measurement"],
     "host/nav/belief": ["host/nav/problem", "host/nav/measurement", "host/nav/field"],
     "host/nav/filter": ["host/nav/problem", "host/nav/measurement", "host/nav/field", "host/nav/belief"],
-    "host/nav/mapping": ["host/nav/problem", "host/nav/measurement", "host/nav/filter"],  # rows of a replay
+    "host/nav/mapping": [
+        "host/nav/problem",
+        "host/nav/measurement",
+        "host/nav/belief",
+        "host/nav/filter",
+    ],  # rows of a replay
     "host/nav/planning": ["host/nav/problem"],
     "host/nav": [],
     "host/create": [],

@@ -122,6 +122,25 @@ static void mass_near_the_mean_is_the_normal_distributions(void **state)
     assert_near(nav_gaussian_mass(&g, 0.25, 10.0), erf(2.5 / sqrt(2.0)), 0.02);
 }
 
+static void a_sum_has_the_moments_of_the_mixture(void **state)
+{
+    (void)state;
+    /* Masses 1 and 3 at x = 0 and 4 m, at headings on both sides of half a turn. */
+    struct nav_gaussian a = {.mean = {0.0, 1.0, NAV_PI - 0.1}, .covariance = {0.5, 0.1, 0, 0.1, 0.2, 0, 0, 0, 0.01}};
+    struct nav_gaussian b = {.mean = {4.0, 1.0, -NAV_PI + 0.1}, .covariance = {0.9, 0.1, 0, 0.1, 0.2, 0, 0, 0, 0.01}};
+    struct nav_gaussian_sum sum = {.about = b.mean};
+    nav_gaussian_sum_add(&sum, 1.0, &a);
+    nav_gaussian_sum_add(&sum, 3.0, &b);
+    struct nav_gaussian g = nav_gaussian_sum_moments(&sum);
+    assert_near(g.mean.x, 3.0, 1e-12);
+    assert_near(g.mean.y, 1.0, 1e-12);
+    assert_near(nav_wrap(g.mean.theta - (NAV_PI + 0.05)), 0.0, 1e-12);
+    assert_near(g.covariance[0], 0.8 + 3.0, 1e-12); /* mean of the variances, variance of the means */
+    assert_near(g.covariance[1], 0.1, 1e-12);
+    assert_near(g.covariance[2], 0.75 * 1.0 * 0.05 - 0.25 * 3.0 * -0.15, 1e-12);
+    assert_near(g.covariance[8], 0.01 + 0.25 * 0.75 * 0.04, 1e-12);
+}
+
 static void noise_grows_with_the_way_not_with_the_number_of_rows(void **state)
 {
     (void)state;
@@ -148,6 +167,7 @@ int main(void)
         cmocka_unit_test(a_circle_walked_in_steps_closes),
         cmocka_unit_test(an_inverse_undoes_and_a_flat_covariance_has_none),
         cmocka_unit_test(mass_near_the_mean_is_the_normal_distributions),
+        cmocka_unit_test(a_sum_has_the_moments_of_the_mixture),
         cmocka_unit_test(noise_grows_with_the_way_not_with_the_number_of_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -8,6 +8,7 @@
 #include "near.h"
 #include "rooms.h"
 #include "touches.h"
+#include "wall.h"
 
 static void test_a_measurement_corrects_what_is_correlated(void **state)
 {
@@ -46,46 +47,15 @@ static void test_contacts_in_a_row_make_a_line(void **state)
     assert_false(nav_touches_fit(&t, last, line.used & ~7ULL, &line));
 }
 
-/* The true distance from a wall at x = 1 m for the whisker of rooms.h. */
-static double wall_distance(struct nav_pose pose)
+static void step(void *mapper, const struct nav_row *row, struct nav_estimate *out)
 {
-    double base_x = pose.x + 0.05 * cos(pose.theta), along = (1.0 - base_x) / cos(pose.theta);
-    return cos(pose.theta) > 0.1 && along >= 0.0 && along <= 0.2 ? along : (double)INFINITY;
-}
-
-struct drive {
-    struct nav_mapper *mapper;
-    struct nav_pose pose; /* true */
-    double t_s;
-    struct nav_estimate estimate;
-};
-
-/* A step of the robot, whose wheels report `gain` times the distance. */
-static void drive_step(struct drive *d, double forward, double turn, double gain)
-{
-    d->pose = nav_compose(d->pose, (struct nav_pose){forward, 0.0, turn});
-    d->t_s += 0.1;
-    double texture[2] = {NAN, NAN}, radial = wall_distance(d->pose);
-    struct nav_row row = {
-        .t_s = d->t_s, .odometry = {gain * forward, 0.0, turn}, .texture = texture, .radial_m = &radial};
-    nav_mapper_step(d->mapper, &row, &d->estimate);
-}
-
-/* Drives to the wall, sweeps along it, and back. */
-static void drive_bout(struct drive *d, double gain)
-{
-    for (int n = 0; n < 30; n++)
-        drive_step(d, 0.02, 0.0, gain);
-    for (int n = 0; n < 20; n++)
-        drive_step(d, 0.0, n < 5 || n >= 15 ? 0.1 : -0.1, gain);
-    for (int n = 0; n < 30; n++)
-        drive_step(d, -0.02, 0.0, 1.0);
+    nav_mapper_step(mapper, row, out);
 }
 
 static struct drive drive_begin(const struct nav_problem *p)
 {
     struct nav_mapper_options options = nav_mapper_default();
-    return (struct drive){.mapper = nav_mapper_new(p, &options), .pose = {0.2, 0.0, 0.0}};
+    return (struct drive){.step = step, .mapper = nav_mapper_new(p, &options), .pose = {0.2, 0.0, 0.0}};
 }
 
 static void test_a_wall_felt_again_corrects_the_pose(void **state)

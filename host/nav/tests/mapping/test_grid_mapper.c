@@ -10,6 +10,7 @@
 #include "grid_sense.h"
 #include "near.h"
 #include "rooms.h"
+#include "wall.h"
 
 static void test_a_copy_shares_until_it_is_written(void **state)
 {
@@ -89,7 +90,7 @@ static void test_a_texture_is_expected_where_it_was_read(void **state)
     nav_grid_pool_free(&pool);
 }
 
-/* A gain of 10 % that lasts: 1 m is known to 0.1 m, and where it ended tells the gain. */
+/* A gain of 10 % that lasts: 1 m is known to 0.1 m, and the gain follows from where it ended. */
 static void test_where_it_ended_tells_the_gain(void **state)
 {
     (void)state;
@@ -132,47 +133,16 @@ static void test_a_measurement_halves_the_variance(void **state)
     assert_near(g.cov[NAV_GRID_X][NAV_GRID_X], 0.005, 1e-6);
 }
 
-struct drive {
-    struct nav_grid_mapper *mapper;
-    struct nav_pose pose; /* true */
-    double t_s;
-    struct nav_estimate estimate;
-};
-
-/* The true distance from a wall at x = 1 m for the whisker of rooms.h. */
-static double wall_distance(struct nav_pose pose)
+static void step(void *mapper, const struct nav_row *row, struct nav_estimate *out)
 {
-    double along = (1.0 - pose.x - 0.05 * cos(pose.theta)) / cos(pose.theta);
-    return cos(pose.theta) > 0.1 && along >= 0.0 && along <= 0.2 ? along : (double)INFINITY;
-}
-
-/* A step of the robot, whose wheels report `gain` times the distance. */
-static void drive_step(struct drive *d, double forward, double turn, double gain)
-{
-    d->pose = nav_compose(d->pose, (struct nav_pose){forward, 0.0, turn});
-    d->t_s += 0.1;
-    double texture[2] = {NAN, NAN}, radial = wall_distance(d->pose);
-    struct nav_row row = {
-        .t_s = d->t_s, .odometry = {gain * forward, 0.0, turn}, .texture = texture, .radial_m = &radial};
-    nav_grid_mapper_step(d->mapper, &row, &d->estimate);
-}
-
-/* Drives to the wall, sweeps along it, and back. */
-static void drive_bout(struct drive *d, double gain)
-{
-    for (int n = 0; n < 30; n++)
-        drive_step(d, 0.02, 0.0, gain);
-    for (int n = 0; n < 20; n++)
-        drive_step(d, 0.0, n < 5 || n >= 15 ? 0.1 : -0.1, gain);
-    for (int n = 0; n < 30; n++)
-        drive_step(d, -0.02, 0.0, 1.0);
+    nav_grid_mapper_step(mapper, row, out);
 }
 
 static struct drive drive_begin(const struct nav_problem *p, bool surface)
 {
     struct nav_grid_mapper_options options = nav_grid_mapper_default();
     options.surface = surface;
-    return (struct drive){.mapper = nav_grid_mapper_new(p, &options), .pose = {0.2, 0.0, 0.0}};
+    return (struct drive){.step = step, .mapper = nav_grid_mapper_new(p, &options), .pose = {0.2, 0.0, 0.0}};
 }
 
 static void test_a_wall_felt_again_corrects_the_pose(void **state)
@@ -255,7 +225,7 @@ static void test_steps_do_not_allocate_and_memory_has_a_bound(void **state)
     (void)state;
     struct nav_problem p = room();
     struct nav_grid_mapper_options options = {.particles = 5000, .surface = true};
-    struct drive d = {.mapper = nav_grid_mapper_new(&p, &options)};
+    struct drive d = {.step = step, .mapper = nav_grid_mapper_new(&p, &options)};
     drive_step(&d, 0.0, 0.0, 1.0);
     assert_true(d.estimate.bytes > 1000000 && d.estimate.bytes < 256000000);
     nav_grid_mapper_free(d.mapper);
