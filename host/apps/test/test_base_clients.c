@@ -200,7 +200,7 @@ static void the_commander_keeps_its_place_while_it_orders(void **state)
     assert_null(reported(0));
 }
 
-static void in_lock_step_whoever_leads_the_stream_keeps_its_place(void **state)
+static void in_lock_step_the_leader_of_the_stream_keeps_its_place(void **state)
 {
     (void)state;
     fill_places(OPENED_MS);
@@ -310,7 +310,7 @@ int main(void)
         WALL(who_has_spoken_of_late_keeps_its_place),
         WALL(who_has_said_nothing_goes_before_who_has_been_silent_for_longer),
         WALL(the_commander_keeps_its_place_while_it_orders),
-        STREAM(in_lock_step_whoever_leads_the_stream_keeps_its_place),
+        STREAM(in_lock_step_the_leader_of_the_stream_keeps_its_place),
         WALL(by_the_wall_clock_waiting_for_a_byte_keeps_no_place),
         WALL(while_one_reason_holds_the_wheels_stand),
         WALL(a_line_that_stays_silent_is_logged_once_and_then_every_hour),

@@ -218,7 +218,7 @@ static void whisker_base_robot_take_frame(struct base_robot *robot, int64_t now_
     robot->silent = false;
     whisker_base_robot_log_back(robot);
     const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
-    base_robot_heed(robot);
+    base_robot_handle_frame(robot);
     robot->on_step(robot->context, &step, base_robot_bits(robot));
     robot->frames_since_drive += 1 + robot->frame.missed;
     if (robot->options->stream_clock && whisker_base_robot_moving(robot) &&

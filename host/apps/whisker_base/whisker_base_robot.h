@@ -110,7 +110,7 @@ void base_robot_health(const struct base_robot *robot, char *text, size_t room);
 int32_t base_robot_mode_reported(const struct base_robot *robot);
 
 /* Takes note of mode and battery in a new frame, and says once what a person should know. */
-void base_robot_heed(struct base_robot *robot);
+void base_robot_handle_frame(struct base_robot *robot);
 
 /* Bits of the newest frame. */
 unsigned base_robot_bits(const struct base_robot *robot);

@@ -69,7 +69,7 @@ static void whisker_base_state_watch_battery(struct base_robot *robot)
     }
 }
 
-void base_robot_heed(struct base_robot *robot)
+void base_robot_handle_frame(struct base_robot *robot)
 {
     whisker_base_state_watch_mode(robot);
     whisker_base_state_watch_battery(robot);

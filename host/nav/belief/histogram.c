@@ -223,7 +223,7 @@ void nav_histogram_clear(struct nav_histogram *h, int level)
     h->level = level;
     h->shape = nav_levels_shape(&h->levels, level);
     h->pass->running = h->uniform = false;
-    h->owed_position = h->owed_heading = h->total = h->now.rotation = 0.0;
+    h->pending_position = h->pending_heading = h->total = h->now.rotation = 0.0;
     memset(h->now.shift_x, 0, (size_t)h->shape.nh * sizeof *h->now.shift_x);
     memset(h->now.shift_y, 0, (size_t)h->shape.nh * sizeof *h->now.shift_y);
     memset(h->now.first, 0, (histogram_shape_lines(&h->shape) + 1) * sizeof *h->now.first);
@@ -404,7 +404,7 @@ bool nav_histogram_refine(struct nav_histogram *h)
  * in the nearest cache. Sums run in fixed lanes of single precision along a line and in double precision over lines. */
 
 /* Blurring costs work, so variance is saved up to this share of a squared cell edge ... */
-static const double OWED_LEAST = 0.05;
+static const double PENDING_LEAST = 0.05;
 /* ... and no three-point kernel takes more than this (its middle weight stays at 1/2). */
 static const double KERNEL_MOST = 0.5;
 
@@ -446,8 +446,8 @@ bool nav_histogram_running(const struct nav_histogram *h)
 double nav_histogram_debt(const struct nav_histogram *h)
 {
     double cell = h->shape.cell, turn = h->shape.cell_theta;
-    return fmax(h->owed_position / (NAV_BLUR_MOST * KERNEL_MOST * cell * cell),
-                h->owed_heading / (KERNEL_MOST * turn * turn));
+    return fmax(h->pending_position / (NAV_BLUR_MOST * KERNEL_MOST * cell * cell),
+                h->pending_heading / (KERNEL_MOST * turn * turn));
 }
 
 /* Takes what is due of a variance, as at most `most` kernels of three points: how many, and their side weight. A kernel
@@ -456,7 +456,7 @@ static int histogram_pass_due(double *pending, double cell, int most, double *si
 {
     double share = *pending / (cell * cell);
     *side = 0.0;
-    if (share < OWED_LEAST)
+    if (share < PENDING_LEAST)
         return 0;
     int kernels = (int)fmin(ceil(share / KERNEL_MOST), most);
     double each = fmin(share / kernels, KERNEL_MOST);
@@ -502,9 +502,9 @@ void nav_histogram_begin(struct nav_histogram *h, struct nav_pose step, const st
     struct nav_pass *p = h->pass;
     double side, side_turn;
     if (h->uniform) /* nothing blurs what is uniform */
-        h->owed_position = h->owed_heading = 0.0;
-    p->blur.reach = histogram_pass_due(&h->owed_position, h->shape.cell, NAV_BLUR_MOST, &side);
-    histogram_pass_due(&h->owed_heading, h->shape.cell_theta, 1, &side_turn);
+        h->pending_position = h->pending_heading = 0.0;
+    p->blur.reach = histogram_pass_due(&h->pending_position, h->shape.cell, NAV_BLUR_MOST, &side);
+    histogram_pass_due(&h->pending_heading, h->shape.cell_theta, 1, &side_turn);
     p->blur.side_turn = (float)side_turn;
     histogram_pass_kernels(p, side, 1.0 / h->total);
     histogram_pass_shift(h, step);

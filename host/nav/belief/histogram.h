@@ -73,7 +73,7 @@ struct nav_histogram {
     bool uniform;  /* and not written out */
     struct nav_cells now, next;
     struct nav_pass *pass;
-    double owed_position, owed_heading; /* variance not yet added, m^2 per axis, rad^2 */
+    double pending_position, pending_heading; /* variance not yet added, m^2 per axis, rad^2 */
     /* What the last pass found: */
     double (*moment)[NAV_MOMENTS]; /* [nh] relative to */
     struct nav_pose about;         /* this place */

@@ -68,8 +68,8 @@ long nav_histogram_components(const struct nav_histogram *h, const struct nav_pe
 {
     struct listing l = {.out = out, .step = pending->step, .scale = mass / h->total, .room = room};
     double cell = h->shape.cell, turn = h->shape.cell_theta;
-    l.each.sigma_m = sqrt(cell * cell / 12.0 + h->owed_position + pending->noise.position);
-    l.each.sigma_rad = sqrt(turn * turn / 12.0 + h->owed_heading + pending->noise.heading);
+    l.each.sigma_m = sqrt(cell * cell / 12.0 + h->pending_position + pending->noise.position);
+    l.each.sigma_rad = sqrt(turn * turn / 12.0 + h->pending_heading + pending->noise.heading);
     nav_histogram_each(h, histogram_list_take, &l);
     return l.count;
 }

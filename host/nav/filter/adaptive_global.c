@@ -58,8 +58,8 @@ static void global_move_row(struct adaptive_global *g, const struct adaptive_ent
 {
     double along_m = g->problem->settings.motion.along_m;
     g->job.step = nav_compose(g->job.step, entry->step);
-    g->histogram.owed_position += entry->noise.position + nav_histogram_fan(&g->histogram, entry->step, along_m);
-    g->histogram.owed_heading += entry->noise.heading;
+    g->histogram.pending_position += entry->noise.position + nav_histogram_fan(&g->histogram, entry->step, along_m);
+    g->histogram.pending_heading += entry->noise.heading;
 }
 
 /* How far the whiskers have gone in a step, m. */

@@ -194,8 +194,8 @@ static void grid_update(void *self, const struct nav_evidence *evidence)
 {
     struct grid *g = self;
     struct nav_pose step = g->pending.step;
-    g->histogram.owed_position += g->pending.noise.position;
-    g->histogram.owed_heading += g->pending.noise.heading;
+    g->histogram.pending_position += g->pending.noise.position;
+    g->histogram.pending_heading += g->pending.noise.heading;
     g->summary.mean = nav_compose(g->summary.mean, step);
     g->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
     nav_likelihood_read(g->likelihood, evidence);

@@ -313,7 +313,7 @@ static int planner_follow(struct nav_planner *p, const struct planner_state *fro
             planner_step(p, &p->path[k].step[n], !first || seen[n].fresh);
             double seconds = planner_seconds(p);
             if (p->open_bits <= *best * seconds)
-                break; /* no end further on is better, for it takes longer and tells no more than all */
+                break; /* no end further on is better, for it takes longer and yields no more than all */
             if (!p->path[k].step[n].ends)
                 continue;
             struct planner_end end = {k, n + 1, planner_bits(p), seconds, planner_passed(p)};

@@ -67,7 +67,7 @@ struct nav_planner_plan {
 struct nav_planner_past {
     int met, been;
     const double *thing; /* [met][2] places of what was in the way, m */
-    const double *pose;  /* [been][3] poses that were read from: a reading there again tells nothing new */
+    const double *pose;  /* [been][3] poses that were read from: a reading there again yields nothing new */
 };
 
 struct nav_planner;

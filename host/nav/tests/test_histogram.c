@@ -38,8 +38,8 @@ static void pass(struct nav_histogram *h, struct nav_pose step, const struct nav
 
 static void move(struct nav_histogram *h, struct nav_pose step, double position, double heading)
 {
-    h->owed_position += position;
-    h->owed_heading += heading;
+    h->pending_position += position;
+    h->pending_heading += heading;
     pass(h, step, &NOTHING);
 }
 
@@ -123,12 +123,12 @@ static void noise_adds_the_variance_asked_for_and_keeps_the_mass(void **state)
         move(&h, STILL, 1e-4, 4e-4);
     move(&h, STILL, 0.01, 0.0); /* as much as one pass can add, and more */
     nav_histogram_summarise(&h, &after);
-    assert_near(h.owed_position, 0.0, 0.01 - 8e-3 * 0.6);
+    assert_near(h.pending_position, 0.0, 0.01 - 8e-3 * 0.6);
     assert_near(total(&h), 1.0, 1e-5);
     assert_near(after.mean.x, before.mean.x, 2e-3); /* cells right on the circle may fall on either side */
-    assert_near(after.covariance[0] - before.covariance[0], 0.015 - h.owed_position, 1e-5);
-    assert_near(after.covariance[4] - before.covariance[4], 0.015 - h.owed_position, 1e-5);
-    assert_near(after.covariance[8] - before.covariance[8], 50 * 4e-4 - h.owed_heading, 1e-4);
+    assert_near(after.covariance[0] - before.covariance[0], 0.015 - h.pending_position, 1e-5);
+    assert_near(after.covariance[4] - before.covariance[4], 0.015 - h.pending_position, 1e-5);
+    assert_near(after.covariance[8] - before.covariance[8], 50 * 4e-4 - h.pending_heading, 1e-4);
     assert_near(after.covariance[1], 0.0, 1e-5);
     nav_histogram_free(&h);
 }
@@ -207,8 +207,8 @@ static void a_pass_is_what_a_dense_computation_gives(void **state)
         const struct nav_weigh weigh = {weigh_group, NULL, 3, kind == 1 ? 1e-3 : 0.0, kind == 2 ? 1e-4 : 0.0};
         double *expected = dense(&h);
         naive(expected, &h.shape, 0.2, 0.15, weigh.extra, weigh.least);
-        h.owed_position = 0.4 * h.shape.cell * h.shape.cell;
-        h.owed_heading = 0.3 * h.shape.cell_theta * h.shape.cell_theta;
+        h.pending_position = 0.4 * h.shape.cell * h.shape.cell;
+        h.pending_heading = 0.3 * h.shape.cell_theta * h.shape.cell_theta;
         pass(&h, STILL, &weigh);
         double *got = dense(&h), sum = 0.0;
         long cells = 0;
@@ -232,8 +232,8 @@ static void an_interrupted_pass_gives_the_same_bits(void **state)
     struct nav_histogram a = scattered(), b = scattered();
     const struct nav_weigh weigh = {weigh_group, NULL, 3, 1e-8, 0.0};
     const struct nav_pose step = {0.23, 0.04, 0.3};
-    a.owed_position = b.owed_position = 0.6 * a.shape.cell * a.shape.cell;
-    a.owed_heading = b.owed_heading = 0.2 * a.shape.cell_theta * a.shape.cell_theta;
+    a.pending_position = b.pending_position = 0.6 * a.shape.cell * a.shape.cell;
+    a.pending_heading = b.pending_heading = 0.2 * a.shape.cell_theta * a.shape.cell_theta;
     double before = total(&b);
     pass(&a, step, &weigh);
     nav_histogram_begin(&b, step, &weigh, STILL);
@@ -404,8 +404,8 @@ static void cells_are_listed_where_they_will_be_and_as_wide(void **state)
     put(&h, 30, 30, 7, 2.0);
     struct nav_pose there = centre(&h, 30, 30, 7);
     const struct nav_pending pending = {{0.1, 0.0, 0.2}, {1e-4, 1e-3}};
-    h.owed_position = 2e-4;
-    h.owed_heading = 2e-3;
+    h.pending_position = 2e-4;
+    h.pending_heading = 2e-3;
     assert_int_equal(nav_histogram_components(&h, &pending, 0.5, &one, 1), 1);
     assert_near(one.pose.x, there.x + 0.1 * cos(there.theta), 1e-9);
     assert_near(one.pose.theta, there.theta + 0.2, 1e-9);

@@ -70,7 +70,7 @@ static const struct nav_robot SWEEPS = {.body_radius = 0.1, .tips = 1, .tip = &T
 static const struct nav_robot FEELS = {.body_radius = 0.05, .rays = 1, .ray = &RAY};
 
 /* After k steps on different floors the two are k / 2 nats apart: 1 - log2(1 + exp(-k / 2)) bits in 4 + k s. The first
- * different floor is met with the fifth step, and k = 6 of ten steps tells most per second. */
+ * different floor is met with the fifth step, and k = 6 of ten steps yields most per second. */
 static void the_gain_is_what_is_worked_out_by_hand(void **state)
 {
     (void)state;

@@ -5,7 +5,7 @@ A lock needs the bits that tell its circle from the rest of free space; what is 
 Texture whiskers: a row repeats the one before it unless a tip has crossed a border of tiles. A path that is laid without
 looking, of a step s in a row, crosses a border of tiles of edge a with probability p = 4 s / (pi a) (Buffon). A tip's rows
 then hold at most log2 C bits in the first row and H(p) + p log2(C - 1) in each further one, C the classes that lie in the
-arena; a border that a path is steered along tells no more. Windows are taken to be right.
+arena; a border that a path is steered along yields no more. Windows are taken to be right.
 
 Object whiskers tell nothing of the place before the nearest solid thing can be within reach, the robot driving straight at
 it, and a body whisk must end first where only that measures. From then on they are taken to tell all.

@@ -299,7 +299,7 @@ static void leave_stale_ring(void)
 #define NOBODY 65534
 
 /* As somebody who may not open the ring's file: both ends get an error that says so. */
-static int attach_and_create_elsewhere(const char *name)
+static int attach_and_create_in_another_place(const char *name)
 {
     struct whisker_reader *reader;
     struct whisker_ring *ring;
@@ -321,7 +321,7 @@ static void ring_of_another_user_is_reported(void **state)
     assert_int_equal(chmod(path(), 0), 0);
     const pid_t child = fork();
     if (child == 0) {
-        _exit(attach_and_create_elsewhere(name));
+        _exit(attach_and_create_in_another_place(name));
     }
     waitpid(child, &status, 0);
     assert_true(WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS);
@@ -415,7 +415,7 @@ static int writer_of_shortened_ring(void)
 }
 
 /* Has a bus error that is none of the ring's business. */
-static int bus_error_elsewhere(void)
+static int bus_error_in_another_mapping(void)
 {
     struct whisker_ring *ring;
     OUTSIDE_ASSERT(whisker_ring_create(test_ring_name(), TEST_CAPACITY, &ring) == 0);
@@ -433,13 +433,13 @@ static void leave(int number)
 static int bus_error_with_handler(void)
 {
     signal(SIGBUS, leave);
-    return bus_error_elsewhere();
+    return bus_error_in_another_mapping();
 }
 
 static int bus_error_without_handler(void)
 {
     signal(SIGBUS, SIG_DFL); /* a sanitizer has one */
-    return bus_error_elsewhere();
+    return bus_error_in_another_mapping();
 }
 
 static void reader_of_a_shortened_ring_is_reported(void **state)

@@ -3,10 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-/* Nats by which a new map explains rows better than the one in use: to be looked into; the robot was carried off; so
- * many more, where it was not. A
- * kidnap a row in ten thousand costs 9; the rest is what rows vary by in which the map in use is merely a little off.
- */
+/* Nats by which a new map explains rows better than the one in use: SUSPECTED, a second map is made of these rows;
+ * NOTICED, a kidnap is decided on; MORE, after a decision that it was none. A kidnap once in ten thousand rows costs 9;
+ * the rest is how much the ratio varies where the map in use is a little off. */
 static const double SUSPECTED = 10.0, NOTICED = 25.0, MORE = 10.0;
 static const double TILE = 6.0;    /* nats that a tile costs which is otherwise than mapped, as in map_belief */
 static const double PROVEN = 20.0; /* and by which a place in the map from before does, of rows held to be in another */
@@ -14,9 +13,9 @@ static const double MET = 0.999;   /* probability of one motion between two maps
 static const double JOINED = 6.0;  /* nats by which one map must explain the rows better than two do */
 static const double SAME_M = 0.5, SAME_RAD = 0.5;         /* a motion so small is no kidnap */
 static const double ENTERED_M = 0.05, ENTERED_RAD = 0.05; /* how well a place is known at which maps meet */
-/* Nats by which wheels that slipped so far, or a floor that is otherwise than mapped, explain rows rather than a
- * kidnap. */
-static const double FLOOR_SHARE = 0.1; /* of what speaks for tiles: so many windows are surer than they should be */
+static const double FLOOR_SHARE = 0.1; /* of the evidence for tiles: windows are more certain than they should be */
+/* Wheels that slipped by SLIP_M and SLIP_RAD, or a floor other than mapped, are preferred to a kidnap within RATHER
+ * nats, and taken over when they explain the rows MENDED nats better. */
 static const double RATHER = 12.0, MENDED = 5.0, SLIP_M = 0.15, SLIP_RAD = 0.3;
 static const double SAME_PLACE_M = 0.2, SAME_PLACE_RAD = 0.3; /* one motion, found again */
 static const double SURE_SCORE = 30.0;                        /* nats of a motion that is found twice */

@@ -394,7 +394,7 @@ static void bank_join(struct nav_contact_part *a, const struct nav_contact_part 
     a->log_weight = log(wa + wb);
 }
 
-/* The best of the still and of the moving objects stays: a base that changes its motion tells them apart late. */
+/* The best of the still and of the moving objects stays: a base that changes its motion separates them late. */
 static void bank_prune(struct nav_contact_filter *f)
 {
     double best[2] = {-INFINITY, -INFINITY};
