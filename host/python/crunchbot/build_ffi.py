@@ -53,6 +53,7 @@ HEADERS = {
             "mapping/mapper.h",
             "planning/planner.h",
             "mapping/grid/grid_mapper.h",
+            "mapping/grid/grid_path.h",
         )
     ],
     "whisker": [

@@ -39,24 +39,14 @@ static int grid_init(struct nav_grid_mapper *m, const struct nav_problem *proble
         return -1;
     size_t each = nav_grid_pool_each(record->classes), count = (size_t)m->particles;
     size_t leaves = POOL_BYTES / each < LEAVES_EACH * count ? POOL_BYTES / each : LEAVES_EACH * count;
-    struct nav_grid_rows *rows = &m->rows;
-    *rows = (struct nav_grid_rows){.robot = &record->problem->robot,
-                                   .settings = &record->problem->settings,
-                                   .ray = nav_record_rays(record),
-                                   .rays = record->rays,
-                                   .tips = record->tips,
-                                   .classes = record->classes};
-    size_t window = (size_t)rows->tips * (1 + (size_t)rows->classes);
-    rows->contact = calloc(NAV_GRID_ROWS_MOST * (size_t)rows->rays + 1, sizeof *rows->contact);
-    rows->window = calloc(NAV_GRID_ROWS_MOST * window + 1, sizeof *rows->window);
     m->particle = calloc(count, sizeof *m->particle);
     m->next = calloc(count, sizeof *m->next);
-    if (nav_grid_pool_init(&m->pool, record->classes, (uint32_t)leaves) || !rows->contact || !rows->window ||
+    if (nav_grid_rows_init(&m->rows, record) || nav_grid_pool_init(&m->pool, record->classes, (uint32_t)leaves) ||
         !m->particle || !m->next)
         return -1;
     for (int n = 0; n < m->particles; n++) {
         m->particle[n].scale = SCALE_LEAST * pow(SCALE_MOST / SCALE_LEAST, nav_rng_uniform(&m->rng));
-        nav_grid_particle_begin(&m->particle[n], rows);
+        nav_grid_particle_begin(&m->particle[n], &m->rows);
     }
     return 0;
 }
@@ -90,8 +80,7 @@ void nav_grid_mapper_free(struct nav_grid_mapper *m)
         return;
     nav_record_free(&m->record);
     nav_grid_pool_free(&m->pool);
-    free(m->rows.contact);
-    free(m->rows.window);
+    nav_grid_rows_free(&m->rows);
     free(m->particle);
     free(m->next);
     free(m);
@@ -170,21 +159,6 @@ static void grid_line(struct nav_grid_mapper *m, const struct nav_record_row *ro
     }
 }
 
-static bool grid_keep(struct nav_grid_mapper *m, const struct nav_record_row *row)
-{
-    struct nav_grid_rows *rows = &m->rows;
-    size_t window = (size_t)rows->tips * (1 + (size_t)rows->classes);
-    bool touches = false;
-    rows->step[rows->count] = row->step;
-    memcpy(rows->contact + (ptrdiff_t)rows->count * rows->rays, row->contact,
-           (size_t)rows->rays * sizeof *rows->contact);
-    memcpy(rows->window + (ptrdiff_t)rows->count * (ptrdiff_t)window, row->window, window * sizeof *rows->window);
-    for (int ray = 0; ray < rows->rays; ray++)
-        touches = touches || (row->contact[ray].weight > 0.0F && !isinf(row->contact[ray].distance));
-    rows->count++;
-    return touches || rows->count == NAV_GRID_ROWS_MOST;
-}
-
 /* Of a row's noise, what is not the odometry's usual error: motion that was not reported. */
 static struct nav_noise grid_lost(const struct nav_grid_mapper *m, const struct nav_record_row *row)
 {
@@ -211,7 +185,7 @@ static void grid_estimate(const struct nav_grid_mapper *m, struct nav_estimate *
 
 static void grid_take(struct nav_grid_mapper *m, const struct nav_record_row *row)
 {
-    bool draw = grid_keep(m, row);
+    bool draw = nav_grid_rows_keep(&m->rows, row) || m->rows.count == NAV_GRID_ROWS_MOST;
     grid_line(m, row);
     struct nav_noise lost = grid_lost(m, row);
     for (int n = 0; n < m->particles; n++) {

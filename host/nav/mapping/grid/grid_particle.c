@@ -29,30 +29,6 @@ void nav_grid_particle_begin(struct nav_grid_particle *p, const struct nav_grid_
     nav_grid_gaussian_begin(&p->now, &odometry);
 }
 
-static struct nav_grid_whisker particle_whisker(const struct nav_grid_rows *rows, int ray, const struct nav_pose *pose)
-{
-    const struct nav_model *m = &rows->ray[ray];
-    double c = cos(pose->theta), s = sin(pose->theta), dx = m->place.c, dy = m->place.s;
-    return (struct nav_grid_whisker){.x = pose->x + c * m->place.x - s * m->place.y,
-                                     .y = pose->y + s * m->place.x + c * m->place.y,
-                                     .c = c * dx - s * dy,
-                                     .s = s * dx + c * dy,
-                                     .length = m->length,
-                                     .sigma = rows->robot->radial_sigma,
-                                     .miss = rows->settings->radial.miss,
-                                     .ghost = rows->settings->radial.ghost};
-}
-
-static const struct nav_record_contact *particle_contacts(const struct nav_grid_rows *rows, int row)
-{
-    return rows->contact + (ptrdiff_t)row * rows->rays;
-}
-
-static bool particle_touches(const struct nav_record_contact *c)
-{
-    return c->weight > 0.0F && !isinf(c->distance);
-}
-
 static double particle_distance(const struct nav_record_contact *c)
 {
     return (double)c->distance;
@@ -83,7 +59,7 @@ static void particle_apply_normal(struct nav_grid_gaussian *g, const struct nav_
 static void particle_apply(struct particle_part *part, struct nav_grid grid, const struct nav_grid_rows *rows, int ray,
                            const struct nav_record_contact *c, struct nav_pose at)
 {
-    struct nav_grid_whisker w = particle_whisker(rows, ray, &at);
+    struct nav_grid_whisker w = nav_grid_rows_whisker(rows, ray, &at);
     double x = w.x + particle_distance(c) * w.c, y = w.y + particle_distance(c) * w.s;
     double others = nav_grid_of_others(grid, &w, particle_distance(c)), of_surface = 0.0;
     struct nav_grid_surface f;
@@ -147,9 +123,9 @@ static void particle_learn_axes(struct nav_grid_particle *p, const struct nav_gr
 static void particle_fit(struct particle_part *part, const struct nav_grid_particle *p, struct nav_grid grid,
                          const struct nav_grid_rows *rows, struct nav_pose at)
 {
-    const struct nav_record_contact *contact = particle_contacts(rows, rows->count - 1);
+    const struct nav_record_contact *contact = nav_grid_rows_contacts(rows, rows->count - 1);
     for (int ray = 0; ray < rows->rays; ray++) {
-        if (!particle_touches(&contact[ray]))
+        if (!nav_grid_touches(&contact[ray]))
             continue;
         particle_apply(part, grid, rows, ray, &contact[ray], at);
         const double *m = part->gaussian.mean;
@@ -175,25 +151,11 @@ static int particle_starts(const struct nav_grid_gaussian *g, struct nav_pose st
     return count;
 }
 
-/* Log-likelihood of the last row's contacts at a pose. */
-static double particle_contacts_at(struct nav_grid grid, const struct nav_grid_rows *rows, const struct nav_pose *pose)
-{
-    const struct nav_record_contact *contact = particle_contacts(rows, rows->count - 1);
-    double sum = 0.0;
-    for (int ray = 0; ray < rows->rays; ray++) {
-        if (!particle_touches(&contact[ray]))
-            continue;
-        struct nav_grid_whisker w = particle_whisker(rows, ray, pose);
-        sum += (double)contact[ray].weight * nav_grid_contact(grid, &w, particle_distance(&contact[ray]));
-    }
-    return sum;
-}
-
 static bool particle_any(const struct nav_grid_rows *rows)
 {
-    const struct nav_record_contact *contact = particle_contacts(rows, rows->count - 1);
+    const struct nav_record_contact *contact = nav_grid_rows_contacts(rows, rows->count - 1);
     for (int ray = 0; ray < rows->rays; ray++) {
-        if (particle_touches(&contact[ray]))
+        if (nav_grid_touches(&contact[ray]))
             return true;
     }
     return false;
@@ -202,14 +164,14 @@ static bool particle_any(const struct nav_grid_rows *rows)
 /* The odometry's own part, contacts taken as of nothing in the map. */
 static void particle_aside(struct particle_part *part, struct nav_grid grid, const struct nav_grid_rows *rows)
 {
-    const struct nav_record_contact *contact = particle_contacts(rows, rows->count - 1);
+    const struct nav_record_contact *contact = nav_grid_rows_contacts(rows, rows->count - 1);
     const double *m = part->gaussian.mean;
     struct nav_pose at = {m[0], m[1], m[2]};
     part->weight = 0.0;
     for (int ray = 0; ray < rows->rays; ray++) {
-        struct nav_grid_whisker w = particle_whisker(rows, ray, &at);
+        struct nav_grid_whisker w = nav_grid_rows_whisker(rows, ray, &at);
         double distance = particle_distance(&contact[ray]);
-        if (particle_touches(&contact[ray]))
+        if (nav_grid_touches(&contact[ray]))
             part->weight += (double)contact[ray].weight * log(nav_grid_of_others(grid, &w, distance) * w.length);
     }
     part->root = nav_grid_gaussian_root(&part->gaussian);
@@ -267,7 +229,7 @@ static struct nav_pose particle_propose(struct nav_grid_particle *p, struct nav_
         part[0].root = nav_grid_gaussian_root(&p->now);
         pose = nav_grid_gaussian_draw(&p->now, &part[0].root, rng);
     }
-    p->weight += ratio + particle_contacts_at(grid, rows, &pose);
+    p->weight += ratio + nav_grid_rows_touched(grid, rows, rows->count - 1, &pose);
     if (rows->lined)
         p->weight += log(particle_right(p, rows, pose.theta, 0.0) + p->refused / (p->right + p->refused));
     nav_grid_gaussian_set(&p->now, pose);
@@ -294,44 +256,6 @@ static void particle_path(const struct nav_grid_particle *p, const struct nav_gr
     }
 }
 
-/* What a row read at a pose, but for the contacts of the last row, which the proposal has weighed. */
-static double particle_weigh(struct nav_grid grid, const struct nav_grid_rows *rows, int row,
-                             const struct nav_pose *pose)
-{
-    const struct nav_record_contact *contact = particle_contacts(rows, row);
-    double sum = 0.0, c = cos(pose->theta), s = sin(pose->theta);
-    for (int ray = 0; ray < rows->rays; ray++) {
-        if (!(contact[ray].weight > 0.0F) || particle_touches(&contact[ray]))
-            continue;
-        struct nav_grid_whisker w = particle_whisker(rows, ray, pose);
-        sum += (double)contact[ray].weight * nav_grid_contact(grid, &w, INFINITY);
-    }
-    for (int tip = 0; tip < rows->tips; tip++) {
-        const float *window = rows->window + (ptrdiff_t)(row * rows->tips + tip) * (1 + rows->classes);
-        const struct nav_tip *t = &rows->robot->tip[tip];
-        if (window[0] >= 0.0F)
-            sum += nav_grid_texture(grid, pose->x + c * t->x - s * t->y, pose->y + s * t->x + c * t->y, window + 1);
-    }
-    return sum;
-}
-
-static void particle_learn(struct nav_grid grid, const struct nav_grid_rows *rows, int row, const struct nav_pose *pose)
-{
-    const struct nav_record_contact *contact = particle_contacts(rows, row);
-    double c = cos(pose->theta), s = sin(pose->theta);
-    for (int ray = 0; ray < rows->rays; ray++) {
-        struct nav_grid_whisker w = particle_whisker(rows, ray, pose);
-        if (contact[ray].weight > 0.0F)
-            nav_grid_learn_contact(grid, &w, particle_distance(&contact[ray]), (double)contact[ray].weight);
-    }
-    for (int tip = 0; tip < rows->tips; tip++) {
-        const float *window = rows->window + (ptrdiff_t)(row * rows->tips + tip) * (1 + rows->classes);
-        const struct nav_tip *t = &rows->robot->tip[tip];
-        if (window[0] >= 0.0F)
-            nav_grid_learn_texture(grid, pose->x + c * t->x - s * t->y, pose->y + s * t->x + c * t->y, window + 1);
-    }
-}
-
 void nav_grid_particle_draw(struct nav_grid_particle *p, struct nav_grid_pool *pool, const struct nav_grid_rows *rows,
                             bool surface, struct nav_rng *rng)
 {
@@ -342,8 +266,8 @@ void nav_grid_particle_draw(struct nav_grid_particle *p, struct nav_grid_pool *p
         particle_learn_axes(p, rows, pose.theta);
     particle_path(p, rows, pose, path);
     for (int row = 0; row < rows->count; row++) {
-        p->weight += particle_weigh(grid, rows, row, &path[row]);
-        particle_learn(grid, rows, row, &path[row]);
+        p->weight += nav_grid_rows_read(grid, rows, row, &path[row]);
+        nav_grid_rows_learn(grid, rows, row, &path[row]);
     }
     p->from = pose;
 }

@@ -3,11 +3,7 @@
 #define NAV_GRID_PARTICLE_H
 
 #include "grid_motion.h"
-#include "grid_sense.h"
-#include "record.h"
-#include "touches.h"
-
-enum { NAV_GRID_ROWS_MOST = 64 };
+#include "grid_rows.h"
 
 struct nav_grid_particle {
     struct nav_pose from;         /* the last pose that was drawn */
@@ -18,19 +14,6 @@ struct nav_grid_particle {
      * the prior's included. */
     double axes, axes_var, right, refused;
     struct nav_grid_map map;
-};
-
-/* Rows since the last pose that was drawn, kept until the path through them is. */
-struct nav_grid_rows {
-    const struct nav_robot *robot;
-    const struct nav_settings *settings;
-    const struct nav_model *ray; /* [rays] */
-    int rays, tips, classes, count;
-    bool lined; /* the last row's contacts complete a line, whose direction is a compass where right angles are */
-    struct nav_touches_line line;
-    struct nav_pose step[NAV_GRID_ROWS_MOST];
-    struct nav_record_contact *contact; /* [ROWS_MOST][rays] */
-    float *window;                      /* [ROWS_MOST][tips][1 + classes] */
 };
 
 struct nav_grid_odometry nav_grid_particle_odometry(const struct nav_grid_particle *, const struct nav_grid_rows *);

@@ -1,5 +1,5 @@
 /* Grid maps that share leaves, what they expect of whiskers, the Gaussian between two draws, and the particles on
- * hand-made rows. */
+ * hand-made rows; and how well a path explains rows. */
 #include "grid_mapper.h"
 
 #include <stdlib.h>
@@ -7,6 +7,7 @@
 
 #include "count_allocations.h"
 #include "grid_motion.h"
+#include "grid_path.h"
 #include "grid_sense.h"
 #include "near.h"
 #include "rooms.h"
@@ -254,6 +255,67 @@ static void test_options_have_limits(void **state)
     nav_grid_mapper_free(NULL);
 }
 
+struct reckoned {
+    struct nav_grid_path *path;
+    struct nav_pose pose;
+    double sum, last;
+};
+
+static void reckon(void *reckoned, const struct nav_row *row, struct nav_estimate *out)
+{
+    struct reckoned *r = reckoned;
+    r->pose = nav_compose(r->pose, (struct nav_pose){row->odometry[0], row->odometry[1], row->odometry[2]});
+    r->last = nav_grid_path_step(r->path, row, &r->pose);
+    r->sum += r->last;
+    out->pose = r->pose;
+}
+
+/* What the wheels report on four ways to the wall and back, as a path. */
+static double path_evidence(const struct nav_problem *p, double gain)
+{
+    struct reckoned r = {.path = nav_grid_path_new(p)};
+    struct drive d = {.step = reckon, .mapper = &r, .pose = {0.2, 0.0, 0.0}};
+    for (int bout = 0; bout < 4; bout++)
+        drive_bout(&d, bout ? gain : 1.0);
+    nav_grid_path_free(r.path);
+    return r.sum;
+}
+
+static void test_a_path_along_which_a_wall_moves_explains_less(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    double here = path_evidence(&p, 1.0), little = path_evidence(&p, 1.02), much = path_evidence(&p, 1.05);
+    assert_true(here > little + 10.0);
+    assert_true(little > much + 10.0);
+}
+
+static void test_the_first_row_of_a_path_is_by_the_prior(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct reckoned r = {.path = nav_grid_path_new(&p)};
+    struct drive d = {.step = reckon, .mapper = &r};
+    allocations = 0;
+    drive_step(&d, 0.02, 0.0, 1.0);
+    /* A whisker of eight cells in the open, a cell solid by 0.02. */
+    double stopped = (1.0 - p.settings.radial.miss) * 0.02;
+    assert_near(r.last, log(1.0 - p.settings.radial.ghost) + 8.0 * log(1.0 - stopped), 1e-6);
+    drive_bout(&d, 1.0);
+    assert_int_equal(allocations, 0);
+    assert_true(nav_grid_path_bytes(r.path) > 1000000 && nav_grid_path_bytes(r.path) < 40000000);
+    nav_grid_path_free(r.path);
+    r.path = NULL;
+    for (long fails = 1; !r.path; fails++) {
+        blocks = allocations = 0;
+        failed_allocation = fails;
+        r.path = nav_grid_path_new(&p);
+        failed_allocation = 0;
+        assert_true(r.path || blocks == 0);
+    }
+    nav_grid_path_free(r.path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -268,6 +330,8 @@ int main(void)
         cmocka_unit_test(test_bad_cells_are_counted_and_not_read),
         cmocka_unit_test(test_steps_do_not_allocate_and_memory_has_a_bound),
         cmocka_unit_test(test_options_have_limits),
+        cmocka_unit_test(test_a_path_along_which_a_wall_moves_explains_less),
+        cmocka_unit_test(test_the_first_row_of_a_path_is_by_the_prior),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

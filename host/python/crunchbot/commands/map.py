@@ -24,10 +24,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--representation",
-        choices=mapping.REPRESENTATIONS,
+        choices=(*mapping.REPRESENTATIONS, mapping.AUTO),
         default="faces",
-        help="what the map is made of: straight faces and tiles; cells, a path a particle; or faces in a factor graph "
-        "of GTSAM, an extra (default: %(default)s)",
+        help="what the map is made of: straight faces and tiles; cells, a path a particle; faces in a factor graph of "
+        "GTSAM, an extra; or faces or cells, whichever the rows are evidence for (default: %(default)s)",
     )
     parser.add_argument(
         "--seed", type=whole_number(0, SEED_MOST), default=0, help="of every draw (default: %(default)s)"

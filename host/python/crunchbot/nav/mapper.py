@@ -120,7 +120,7 @@ class Mapper:
             raise MappingError(f"--particles {particles}: outside 1 to {PARTICLES_MOST}; choose a number inside")
         if not 0 <= seed <= SEED_MOST:
             raise MappingError(f"--seed {seed}: outside 0 to 2^64 - 1; choose a number inside")
-        self._problem, self._keep = problem_of(Scene(_nowhere(textures), robot), {})
+        self._problem, self._keep = problem_of(Scene(nowhere(textures), robot), {})
         self._texture = (len(robot.of_role("texture")), len(textures))
         self._rays = len(robot.of_role("object"))
         self._problem.seed, self._problem.robot.normals = seed, normals
@@ -218,7 +218,7 @@ def default_particles(kind: type[Mapper] = Mapper) -> int:
     return int(getattr(lib, f"{kind.PREFIX}_default")().particles)
 
 
-def _nowhere(textures: tuple[str, ...]) -> Arena:
+def nowhere(textures: tuple[str, ...]) -> Arena:
     """An arena of which nothing but the textures' names is known. Its tile stands for the least patch of one texture that
     is looked for; runs of wrong windows are shorter than half of it."""
     return Arena((PATCH_M, PATCH_M), PATCH_M, textures, ("?",), ())

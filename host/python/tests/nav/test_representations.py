@@ -1,15 +1,20 @@
 """Other representations of a map by touch: grid maps and the factor graph, by their options, errors and figures."""
 
+import json
 import sys
+from itertools import cycle
 
 import numpy as np
 import pytest
 
 from crunchbot import cli
 from crunchbot.nav import mapping
+from crunchbot.nav.filters import ESTIMATE
 from crunchbot.nav.grid_mapper import GridMapper
+from crunchbot.nav.map_choice import evidence_of
 from crunchbot.nav.map_graph import Borders, GraphMapper
-from crunchbot.nav.mapper import MappingError
+from crunchbot.nav.mapper import Mapper, MappingError, Part
+from crunchbot.occupancy import from_map
 from crunchbot_lab.scenes import map_scoring, write_scene
 from crunchbot_lab.scenes.making import make
 
@@ -73,3 +78,46 @@ def test_a_change_of_texture_is_a_border_where_it_was_crossed(made):
     row, x, _ = found[0]
     assert 30 <= row <= 33
     assert abs(x - (tip[0] - 0.02 * (row - 29.5))) < 0.03
+
+
+def along(poses: np.ndarray) -> np.ndarray:
+    """Estimates of these poses (n, 3)."""
+    table = np.zeros(len(poses), ESTIMATE)
+    table["pose"] = poses
+    return table
+
+
+def test_the_true_path_has_more_evidence_than_the_wheels(made):
+    robot, textures, rows = made.scene.robot, made.scene.arena.textures, made.observations
+    truth = along(from_map(rows.truth, tuple(rows.truth[0])))
+    wheels = along(map_scoring.odometry_path(rows.odometry))
+    true, reckoned = (evidence_of(robot, textures, rows, table) for table in (truth, wheels))
+    assert true.shape == (ROWS,) and np.isfinite(true).all() and np.isfinite(reckoned).all()
+    assert true.sum() > reckoned.sum() + 100.0
+
+
+def test_faces_are_taken_where_they_explain_the_rows_better(made, tmp_path, capsys):
+    write_scene(tmp_path / "scene", made.scene, made.observations)
+    words = ["map", str(tmp_path / "scene"), "--out", str(tmp_path / "map"), "--representation", "auto", "--json"]
+    assert cli.main(words) == 0
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["representation"] == "faces" and reported["evidence_nats"] > 100.0
+
+
+@pytest.mark.parametrize(("faces", "grid", "taken"), [(-7.0, -5.0, "grid"), (-5.0, -7.0, "faces")])
+def test_what_is_taken_follows_the_evidence(made, monkeypatch, faces, grid, taken):
+    reported = cycle((faces, grid))
+    monkeypatch.setattr(mapping, "evidence_of", lambda *_: np.array([next(reported)]))
+    options = (made.scene.robot, made.scene.arena.textures, made.observations)
+    run, alone = (mapping.run(*options, representation=name) for name in (mapping.AUTO, taken))
+    assert (run.representation, run.evidence) == (taken, 2.0)
+    assert np.array_equal(run.table, alone.table)
+    assert (run.step_us > 0.0).all()
+
+
+def test_a_robot_that_was_carried_off_is_the_faces(made, monkeypatch):
+    parts = [Part(0, 0, 0, None, None, None), Part(1, 50, 60, None, None, None)]
+    monkeypatch.setattr(Mapper, "parts", lambda _: parts)
+    options = (made.scene.robot, made.scene.arena.textures, made.observations)
+    run = mapping.run(*options, representation=mapping.AUTO)
+    assert (run.representation, run.evidence) == ("faces", None)
