@@ -72,8 +72,7 @@ double nav_grid_rows_touched(struct nav_grid grid, const struct nav_grid_rows *r
     return sum;
 }
 
-double nav_grid_rows_read(struct nav_grid grid, const struct nav_grid_rows *rows, int row,
-                          const struct nav_pose *pose)
+double nav_grid_rows_read(struct nav_grid grid, const struct nav_grid_rows *rows, int row, const struct nav_pose *pose)
 {
     const struct nav_record_contact *contact = nav_grid_rows_contacts(rows, row);
     double sum = 0.0, c = cos(pose->theta), s = sin(pose->theta);
