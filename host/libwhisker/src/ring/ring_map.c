@@ -18,6 +18,10 @@
  * longer there, by which its user knows. Any other SIGBUS goes to whom it went before.
  */
 
+/* The fault may come within an atomic access, which ThreadSanitizer makes under a lock of its own (GCC 13 and later):
+ * an atomic access of the handler would wait for that lock for ever. */
+#define RING_GUARD_IN_HANDLER __attribute__((no_sanitize("thread")))
+
 /* A handler in any thread may walk the list at any time, so entries are used again but never freed. */
 struct guard {
     _Atomic uintptr_t base; /* 0: nothing guarded */
@@ -31,7 +35,7 @@ static _Atomic(struct guard *) guards;
 static struct sigaction before;
 static pthread_once_t guard_once = PTHREAD_ONCE_INIT;
 
-static bool ring_guard_replace_memory_at(uintptr_t address)
+RING_GUARD_IN_HANDLER static bool ring_guard_replace_memory_at(uintptr_t address)
 {
     for (struct guard *guard = atomic_load(&guards); guard; guard = guard->next) {
         const uintptr_t base = atomic_load(&guard->base);
@@ -57,7 +61,7 @@ static void ring_guard_pass_on(int number, siginfo_t *info, void *context)
     }
 }
 
-static void ring_guard_on_bus_error(int number, siginfo_t *info, void *context)
+RING_GUARD_IN_HANDLER static void ring_guard_on_bus_error(int number, siginfo_t *info, void *context)
 {
     const int kept = errno;
     if (info->si_code != BUS_ADRERR || !ring_guard_replace_memory_at((uintptr_t)info->si_addr)) {
