@@ -1,13 +1,22 @@
-"""The commands in the pages are run as they stand, on the example data set and beside a simulated bridge; those that are not are
-listed with the reason. Replaced are names that two test runs would share, and lengths of time."""
+"""The commands in the pages are run as they stand: on the example data set, beside a simulated bridge, and, those of a robot,
+where no bridge and no base are plugged in. Those that are not run are listed with the reason. Replaced are names that two
+test runs would share, and lengths of time."""
 
+import os
 import re
 import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from chainrun import BUILD
-from test_examples import FOREVER, RING, bridge, check, place, with_own_names
+from keykit import certificates, documented
+from linkkit import free_port
+from test_examples import FOREVER, PATIENCE_S, RING, bridge, check, place, with_own_names
 from test_page_commands import ALL
+from thymiologs import write_published
 
 FILES = {  # what the pages' commands read, by what stands for it
     "drive.mcap": "examples/drive.mcap",
@@ -22,8 +31,11 @@ FILES = {  # what the pages' commands read, by what stands for it
     "scenes/run1": "examples/scene",
     "scenes/robot": "examples/scene",
     "SCENE": "examples/scene",
+    "MODELS/texture.json": "examples/texture.json",
+    **{f"{name}{n}.json": "examples/radial.json" for name in ("MODELS/object", "models/object_") for n in (1, 2, 3, 4)},
     "firmware/images/mlx90333/node.whex": "examples/node.whex",
 }
+LOG, LOG_ROWS = "recordings/random_1", 30  # a Thymio's
 # What a command prints, or FOREVER: it runs until Ctrl-C. In this order: some write what others read.
 ON_FILES = {
     "whisker scene make --list-families": "anchor",
@@ -46,10 +58,21 @@ ON_FILES = {
     "whisker flash firmware/images/mlx90333/node.whex --dry-run": "no bridge is connected",
     "whisker scene make --family anchor --seed 500 --steps 3000 --out scenes/500": "scenes/500: anchor, seed 500",
     "whisker map scenes/500 --out maps/touch": "faces: ",
+    "whisker bench map maps/touch maps/mine --scene scenes/500": "maps/mine",
+    "whisker bench touch --scene anchor+global --estimate est.csv": "sure and wrong",
+    "whisker scene from thymio recordings/random_1 --out scenes/random_1": f"scenes/random_1: from {LOG}, {LOG_ROWS - 1} rows",
+    "whisker bench touch --scene scenes/random_1 --estimate est.csv --json": '"error_median_m": ',
+    "whisker bench touch --scene thymio/random_1 --data DIR --filter particle --chart way.svg": "published theirs",
+}
+BEFORE = {  # what makes the files that a command reads
+    "whisker bench map maps/touch maps/mine --scene scenes/500": "cp -r maps/touch maps/mine",
+    "whisker bench touch --scene anchor+global --estimate est.csv": "whisker localise scenes/global --out est.csv",
+    "whisker bench touch --scene scenes/random_1 --estimate est.csv --json": "whisker localise scenes/random_1 --out est.csv",
 }
 WITH_BRIDGE = {
     "whisker info": "wire_version: ",
     "whisker info --nodes": "lane",
+    "whisker calibrate --out calibration --scene scenes/mine": "rest (",
     "whisker doctor": "frames in 0.5 s",
     "whisker top --scene scenes/mine --once": "lane",
     "whisker stream --lanes 0,1 --frames 16000": "",
@@ -58,6 +81,30 @@ WITH_BRIDGE = {
     "whisker replay drive.mcap --ring replayed": "frames",
     "whisker replay drive.mcap --ring replayed --speed 2": "frames",
     "whisker-view --open": FOREVER,
+}
+# What a command prints that ends without hardware, or waits for it until Ctrl-C.
+WITHOUT_HARDWARE = {
+    "whisker bridge-sim --mechanics modes": "is up",
+    "whisker bridge-sim --usbip": "the bridge is served by usbip",
+    "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --create 1": "starting whiskerd, base, pilot",
+    "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --create 1 --desktop": "starting navigator, bag, view, ",
+    "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --desktop": "starting navigator, bag, view, ",
+    "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --desktop --units units": "whisker-robot.target; next: ",
+    "whisker robot SCENE --models MODELS --no-daemon": "starting base, pilot",
+    "whisker robot scenes/mine --models models --port /dev/ttyUSB0 --create 1 --desktop --out run1": "starting navigator, ",
+    "whisker-base --help": "--socket PATH",
+    "whisker-base --port /dev/ttyUSB0 --socket base.sock": "there is no such port; plug the adapter in",
+    "whisker-base --port /dev/ttyUSB0 --socket base.sock --verbose": "there is no such port; plug the adapter in",
+    "whisker-view --ring a --ring b": "http://127.0.0.1:",
+    "whisker-view --ring replayed --port 0": "http://127.0.0.1:",
+    "whisker-view --robot --connect tcp/robot.local:7458": "http://127.0.0.1:",
+    "whisker-view --robot --connect tls/robot.local:7458 --zenoh-config FILE": "http://127.0.0.1:",
+    "whisker-view --robot --scene SCENE": "http://127.0.0.1:",
+    "whiskerd --ring whisker": "no bridge is connected; plug it in",
+    "whiskerd --ring whisker --wait": "no bridge is connected; plug it in",
+    "whiskerd --ring whisker --wait --verbose": "no bridge is connected; plug it in",
+    "whiskerd --ring whisker --serial 0001 --second 0002": "no bridge of this serial number is connected",
+    "whiskerd --ring whisker --serial 0001 --second 0002 --tick-in rising": "no bridge of this serial number is connected",
 }
 REASONS = {
     "the example of its help, which test_examples.py runs": (
@@ -68,6 +115,7 @@ REASONS = {
         "whisker robot --simulated --desktop",
         "whisker ros2 robot-run/scene",
         "whisker bag run.mcap --scene SCENE",
+        "whisker bag run.mcap --scene SCENE --connect tcp/192.168.7.2:7458 --connect tcp/127.0.0.1:7459",
         "whisker scene from run.mcap --out scenes/run",
         "whisker scene from run1/robot.mcap --out scenes/run1",
         "whisker texture train textures --out models/texture.json",
@@ -78,45 +126,14 @@ REASONS = {
         "whisker ros2 robot-run/scene --rmw cyclonedds",  # host/python/tests/robot/standard/test_robot_cyclonedds.py
         "whisker robot scenes/mine --simulated --desktop --seconds 120 --out try",  # test_walkthrough.py, shorter
         "whisker view robot-run/robot.mcap",  # host/python/tests/view/test_view_playback.py
-        "whisker-view --robot --scene SCENE",  # host/python/tests/view/test_view_robot.py
-        "whisker-view --ring replayed --port 0",
-        "whisker-view --ring a --ring b",
-        "whisker-base --help",  # test_manual.py, whose pages are made of it
         "whisker-base --port /tmp/create --socket base.sock",  # host/python/tests/pilot/test_base_emulator.py
-        "whisker bridge-sim --mechanics modes",
-        "whisker scene from build/demo --out scenes/demo",
+        "whisker scene from build/demo --out scenes/demo",  # lab/tests/scenes/test_scenes.py reads a smaller run
     ),
-    "needs a person who sets contacts or wires": (
+    "needs a person who sets contacts; tests/chain/test_calibrate_chain.py has a post in their place": (
         "whisker calibrate --out calibration --lane 2 --radii 90,100,110,120,130",
         "whisker calibrate --lane 2 --radii 90,100,110,120,130,138 --repeats 5 --whisk-rad-s 0.1309 --out calibration",
-        "whisker calibrate --out calibration --scene scenes/mine",
         "whisker calibrate --out calibration --scene scenes/mine --nodes nodes.txt --lane 3 --radii "
         "90,100,110,120,130,138 --repeats 5 --whisk-rad-s 0.1309",
-    ),
-    "needs hardware: a bridge, a base, another machine": (
-        "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --create 1",
-        "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --create 1 --desktop",
-        "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --desktop",
-        "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --desktop --units units",
-        "whisker robot SCENE --models MODELS --no-daemon",
-        "whisker robot scenes/mine --models models --port /dev/ttyUSB0 --create 1 --desktop --out run1",
-        "whisker-base --port /dev/ttyUSB0 --socket base.sock",
-        "whisker-base --port /dev/ttyUSB0 --socket base.sock --verbose",
-        "whisker-view --robot --connect tcp/robot.local:7458",
-        "whisker-view --robot --connect tls/robot.local:7458 --zenoh-config FILE",
-        "whiskerd --ring whisker",
-        "whiskerd --ring whisker --wait",
-        "whiskerd --ring whisker --wait --verbose",
-        "whiskerd --ring whisker --serial 0001 --second 0002",
-        "whiskerd --ring whisker --serial 0001 --second 0002 --tick-in rising",
-    ),
-    "needs root and a module of the kernel": ("whisker bridge-sim --usbip",),
-    "needs estimates, maps or recordings of others": (
-        "whisker bench map maps/touch maps/mine --scene scenes/500",
-        "whisker bench touch --scene anchor+global --estimate est.csv",
-        "whisker bench touch --scene scenes/random_1 --estimate est.csv --json",
-        "whisker bench touch --scene thymio/random_1 --data DIR --filter particle --chart way.svg",
-        "whisker scene from thymio recordings/random_1 --out scenes/random_1",
     ),
 }
 LENGTHS = (("--seconds 60", "--seconds 2"), ("--frames 16000", "--frames 400"))
@@ -130,7 +147,7 @@ def in_pages() -> set[str]:
 
 def test_every_command_is_run_or_has_a_reason():
     reasons = [line for lines in REASONS.values() for line in lines]
-    listed = [*ON_FILES, *WITH_BRIDGE, *reasons]
+    listed = [*ON_FILES, *WITH_BRIDGE, *WITHOUT_HARDWARE, *reasons]
     assert sorted(listed) == sorted(in_pages())
 
 
@@ -140,22 +157,44 @@ def desk(place):
         (place / name).parent.mkdir(parents=True, exist_ok=True)
         copy = shutil.copytree if (place / source).is_dir() else shutil.copy
         copy(place / source, place / name)
+    for folder in (LOG, "DIR/thymio/random_1"):
+        write_published(place / folder, LOG_ROWS)
+    certificates(place, "view")
+    shutil.copy(documented(place, "view"), place / "FILE")
     return place
 
 
-def try_out(line: str, wanted: str | int, folder, more: str = "") -> None:
+@pytest.fixture
+def nothing_plugged(tmp_path, monkeypatch):
+    """No USB device is there for the programs that `umockdev-wrapper` starts, whatever is plugged into this machine."""
+    (tmp_path / "sys/bus").mkdir(parents=True)
+    (tmp_path / "dev").mkdir()
+    monkeypatch.setenv("UMOCKDEV_DIR", str(tmp_path))
+
+
+def shorter(line: str) -> str:
     for long, short in LENGTHS:
         line = line.replace(long, short)
-    if "record" in line:
-        (folder / "drive.mcap").unlink(missing_ok=True)
-    line = with_own_names(line, more).replace("--ring replayed", f"--ring {RING}-3")
+    return line
+
+
+def words_of(line: str) -> str:
+    """A line whose program, if it is one of the build's, is named by its path."""
     program = line.split()[0]
     native = BUILD / "host/apps" / program
-    check(line.replace(program, str(native), 1) if native.exists() else line, folder, wanted, 5.0)
+    return line.replace(program, str(native), 1) if native.exists() else line
+
+
+def try_out(line: str, wanted: str | int, folder: Path, more: str = "") -> None:
+    if "record" in line:
+        (folder / "drive.mcap").unlink(missing_ok=True)
+    named = with_own_names(shorter(line), more).replace("--ring replayed", f"--ring {RING}-3")
+    before = f"{BEFORE[line]} && " if line in BEFORE else ""
+    check(before + words_of(named), folder, wanted, 5.0)
 
 
 @pytest.mark.parametrize("line", ON_FILES)
-def test_a_command_on_files(desk, line):
+def test_a_command_on_files(desk, nothing_plugged, line):
     try_out(line, ON_FILES[line], desk)
 
 
@@ -163,6 +202,41 @@ def test_a_command_on_files(desk, line):
 def test_a_command_beside_a_bridge(bridge, desk, line):
     own = f"--ring {RING}" if "--ring" not in line else ""
     try_out(line, WITH_BRIDGE[line], desk, f"{own} --port 0" if line.startswith("whisker-view") else own)
+
+
+@pytest.mark.parametrize("line", WITHOUT_HARDWARE)
+def test_a_command_without_hardware(desk, nothing_plugged, line):
+    more = {"whisker robot": f"--first-port {free_port(3)} --view-port 0 --ring {RING}-5", "whisker-view": "--port 0"}
+    own = next((options for start, options in more.items() if line.startswith(start)), "")
+    if "bridge-sim" in line:
+        own = "0" if line.endswith("--usbip") else f"--ring {RING}-6"
+    named = line.replace("--ring whisker", f"--ring {RING}-5").replace("/dev/ttyUSB0", "/dev/no-adapter")
+    said, code = said_until(f"{words_of(named)} {own}", WITHOUT_HARDWARE[line], desk)
+    assert WITHOUT_HARDWARE[line] in said and "Traceback" not in said and "usage:" not in said, said
+    assert code in (0, 1, FOREVER, -signal.SIGINT), said
+
+
+def said_until(line: str, wanted: str, folder: Path) -> tuple[str, int]:
+    """What a command printed, with its exit code; Ctrl-C comes once it has printed what is wanted."""
+    wrapped = line if "bridge-sim" in line else f"umockdev-wrapper {line}"
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    process = subprocess.Popen(
+        ["sh", "-c", f"exec {wrapped}"],
+        cwd=folder,
+        env=environment,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
+    said = ""
+    for printed in process.stdout:
+        said += printed
+        if wanted in said:
+            process.send_signal(signal.SIGINT)
+            break
+    rest, _ = process.communicate(timeout=PATIENCE_S)
+    return said + rest, process.returncode
 
 
 __all__ = ["bridge", "place"]

@@ -2,10 +2,9 @@
 
 import json
 
-import numpy as np
 import pytest
 from commandkit import run
-from PIL import Image
+from thymiologs import write_published
 
 from crunchbot.nav.observations import observations_path, read_observations
 from crunchbot.scene import load
@@ -16,19 +15,8 @@ ROWS = 30
 
 @pytest.fixture
 def logs(tmp_path):
-    """A Thymio's log of few rows on a chessboard, with a published estimate of every tenth line."""
-    folder = tmp_path / "data/thymio/random_1"
-    folder.mkdir(parents=True)
-    Image.fromarray((np.indices((50, 50)).sum(axis=0) % 2 * 255).astype(np.uint8)).save(folder.parent / "map.png")
-    path = np.column_stack([0.1 + 0.01 * np.arange(ROWS), np.full(ROWS, 0.25)])
-    np.savetxt(folder / "gt.txt", np.column_stack([path, np.zeros(ROWS)]))
-    np.savetxt(folder / "odom_pose.txt", path)
-    np.savetxt(folder / "odom_quaternion.txt", np.tile([0.0, 1.0], (ROWS, 1)))
-    for name in ("left", "right"):
-        np.savetxt(folder / f"sensor_{name}.txt", np.full(ROWS, 60))
-    (folder.parent / "published").mkdir()
-    lines = [f"{n} 2.5 0 0 0 {100 * path[n, 0]} 25 0 0 0 0" for n in (10, 20)]
-    (folder.parent / "published/pub_random_1.theirs").write_text("\n".join(lines) + "\n")
+    """A folder with a Thymio's log of few rows."""
+    write_published(tmp_path / "data/thymio/random_1", ROWS)
     return tmp_path / "data"
 
 

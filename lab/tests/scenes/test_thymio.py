@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from commandkit import run
-from PIL import Image
+from thymiologs import write_log
 
 from crunchbot.nav import localise
 from crunchbot.scene import load
@@ -21,14 +21,7 @@ PATH = np.array([[0.02, 0.02, 0.1], [0.03, 0.022, 0.2], [0.04, 0.03, 3.1], [0.03
 def recording(tmp_path):
     """Four lines along PATH: left on black, right on white, but for the last row's left."""
     folder = tmp_path / "run"
-    folder.mkdir()
-    Image.fromarray(np.kron(CELLS, np.ones((2, 2), np.uint8))).save(tmp_path / "map.png")
-    half = PATH[:, 2] / 2
-    np.savetxt(folder / "gt.txt", PATH)
-    np.savetxt(folder / "odom_pose.txt", PATH[:, :2])
-    np.savetxt(folder / "odom_quaternion.txt", np.column_stack([np.sin(half), np.cos(half)]))
-    np.savetxt(folder / "sensor_left.txt", [60, 60, 60, 405])
-    np.savetxt(folder / "sensor_right.txt", [750] * 4)
+    write_log(folder, np.kron(CELLS, np.ones((2, 2))), PATH, [60, 60, 60, 405], [750] * 4)
     return folder
 
 
