@@ -47,7 +47,7 @@ static const struct command_option OPTIONS[] = {
     {"replace", NULL, "stop the whiskerd that has this ring, if it is yours, root's or the service's, and\ntake over",
      COMMAND_FLAG, AT(replace), 0, 0, NULL},
     {"list", NULL, "print serial number, place and state of each bridge", COMMAND_FLAG, AT(list), 0, 0, NULL},
-    {"batch", "N", "frames of one USB transfer, even, 2 to 16: latency against work", COMMAND_BYTE, AT(settings.batch),
+    {"batch", "N", "frames of one USB transfer, even, 2 to 64: latency against work", COMMAND_BYTE, AT(settings.batch),
      0, UINT8_MAX, NULL},
     {"lane-mask", "M", "bit n set: lane n is in use", COMMAND_MASK, AT(settings.lane_mask), 0, UINT32_MAX, NULL},
     {"tick-period", "N", "cycles of 60 MHz from tick to tick", COMMAND_NUMBER, AT(settings.tick_period), 0, UINT32_MAX,

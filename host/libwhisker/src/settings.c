@@ -6,9 +6,9 @@
 #include "whisker/errors.h"
 #include "whisker_protocol.h"
 
-/* Frames: a packet holds two, a transfer of 4 KiB sixteen. */
+/* Frames: a packet holds two, 16 KiB sixty-four: what libusb hands to Linux in one piece. */
 #define BATCH_MIN 2
-#define BATCH_MAX 16
+#define BATCH_MAX 64
 #define BATCH_DEFAULT 4
 /* Words of a record on the node link. */
 #define WORDS 4

@@ -240,7 +240,7 @@ static void the_batch_divides_what_is_queued(void **state)
     struct whisker_settings settings;
     whisker_settings_default(&settings);
     open_good();
-    for (settings.batch = 2; settings.batch <= 16; settings.batch = (uint8_t)(settings.batch * 2)) {
+    for (settings.batch = 2; settings.batch <= 64; settings.batch = (uint8_t)(settings.batch * 2)) {
         assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
         assert_int_equal(fake.in_flight, 256 / settings.batch);
         whisker_device_flush(device);
@@ -482,7 +482,9 @@ static void settings_outside_their_limits_are_named(void **state)
     assert_setting(bad, "the tick period is 3999; it must be 4000 to 4294967295");
     bad = good;
     bad.batch = 3;
-    assert_setting(bad, "the batch is 3; it must be even, 2 to 16");
+    assert_setting(bad, "the batch is 3; it must be even, 2 to 64");
+    bad.batch = 66;
+    assert_setting(bad, "the batch is 66; it must be even, 2 to 64");
     bad = good;
     bad.lane_mask = 1u << 28; /* a 29th lane */
     assert_setting(bad, "the lane mask 0x10000000 names more than lanes 0 to 27; use bits of 0xfffffff");

@@ -8,7 +8,7 @@ complete -c whiskerd -l wait -d 'wait for a bridge instead of failing when there
 complete -c whiskerd -l once -d 'end when the bridge goes, instead of waiting for it'
 complete -c whiskerd -l replace -d 'stop the whiskerd that has this ring, if it is yours, root'\''s or the service'\''s, and take over'
 complete -c whiskerd -l list -d 'print serial number, place and state of each bridge'
-complete -c whiskerd -l batch -d 'frames of one USB transfer, even, 2 to 16: latency against work (4)' -x
+complete -c whiskerd -l batch -d 'frames of one USB transfer, even, 2 to 64: latency against work (4)' -x
 complete -c whiskerd -l lane-mask -d 'bit n set: lane n is in use (0xfffffff)' -x
 complete -c whiskerd -l tick-period -d 'cycles of 60 MHz from tick to tick (30000)' -x
 complete -c whiskerd -l sck-divider -d 'cycles of 60 MHz of one SCK period (16)' -x

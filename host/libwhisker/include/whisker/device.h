@@ -45,7 +45,7 @@ struct whisker_settings {
     uint8_t sck_divider;  /* one SCK period: even, 6 to 32 */
     uint8_t word_gap;     /* SCK idle between two words: 30 to 255 */
     uint8_t sample_point; /* MISO is read this long after the edge that shifted it: 1 to sck_divider */
-    uint8_t batch;        /* frames of one USB transfer, even, 2 to 16: fewer come sooner, more cost less */
+    uint8_t batch;        /* frames of one USB transfer, even, 2 to 64: fewer come sooner, more cost less */
     uint8_t transfers;    /* that one whisker_device_poll() takes at most: for those who throw frames away. 0: as they
                              come, 64 KiB queued, which outlasts the pauses of a loaded machine */
     uint8_t options;      /* WHISKER_OPTION_* */
