@@ -74,20 +74,27 @@ struct nav_pose nav_gaussian_at(const struct nav_gaussian *g, const double l[9],
                              nav_wrap(g->mean.theta + l[6] * z[0] + l[7] * z[1] + l[8] * z[2])};
 }
 
-/* Mass of whitened lattice point i of `points`, which reach to 3 standard deviations. */
-static double gaussian_share(int i, int points)
+enum { ACROSS = 25, TURNS = 7 }; /* points of the whitened lattice along an axis */
+
+/* Mass of each of `points` whitened lattice points, which reach to 3 standard deviations. */
+static void gaussian_shares(int points, double *share)
 {
     double total = 0.0, half = (points - 1) / 2.0;
+    for (int k = 0; k < points; k++) {
+        share[k] = exp(-4.5 * (k - half) * (k - half) / (half * half));
+        total += share[k];
+    }
     for (int k = 0; k < points; k++)
-        total += exp(-4.5 * (k - half) * (k - half) / (half * half));
-    return exp(-4.5 * (i - half) * (i - half) / (half * half)) / total;
+        share[k] /= total;
 }
 
 long nav_gaussian_components(const struct nav_gaussian *g, struct nav_component *out, long room)
 {
-    enum { ACROSS = 25, TURNS = 7, ALL = ACROSS * ACROSS * TURNS };
-    double l[9], spacing = 6.0 / (ACROSS - 1), spacing_turn = 6.0 / (TURNS - 1);
+    enum { ALL = ACROSS * ACROSS * TURNS };
+    double l[9], share[ACROSS], share_turn[TURNS], spacing = 6.0 / (ACROSS - 1), spacing_turn = 6.0 / (TURNS - 1);
     nav_gaussian_root(g->covariance, l);
+    gaussian_shares(ACROSS, share);
+    gaussian_shares(TURNS, share_turn);
     for (int n = 0; n < ALL && n < room; n++) {
         int i = n / TURNS / ACROSS, j = n / TURNS % ACROSS, k = n % TURNS;
         const double z[3] = {spacing * (i - ACROSS / 2), spacing * (j - ACROSS / 2), spacing_turn * (k - TURNS / 2)};
@@ -95,7 +102,7 @@ long nav_gaussian_components(const struct nav_gaussian *g, struct nav_component 
             .pose = nav_gaussian_at(g, l, z),
             .sigma_m = spacing / sqrt(12.0) * fmax(hypot(l[0], l[3]), l[4]), /* no gaps along the long axis */
             .sigma_rad = spacing_turn / sqrt(12.0) * l[8],
-            .mass = gaussian_share(i, ACROSS) * gaussian_share(j, ACROSS) * gaussian_share(k, TURNS),
+            .mass = share[i] * share[j] * share_turn[k],
         };
     }
     return ALL;

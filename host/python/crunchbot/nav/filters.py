@@ -148,6 +148,7 @@ class Filter:
         self._filter = ffi.gc(made, lib.nav_filter_free)
         self._tips, self._rays = len(scene.robot.of_role("texture")), len(scene.robot.of_role("object"))
         self._classes = len(scene.arena.textures)
+        self._components_room = 0  # enough for the latest list, mostly: to count costs as much as to list
 
     def step(self, row: Row | Mapping[str, float | None]) -> Estimate:
         """Take one row. KeyError when a column of the scene's layout is missing; readings and directions may be."""
@@ -212,10 +213,12 @@ class Filter:
 
     def components(self) -> np.ndarray:
         """The belief after the last row as components, (n,) of COMPONENT."""
-        count = self.component_count
-        out = np.zeros(count, COMPONENT)
-        lib.nav_filter_components(self._filter, _components(out), count)
-        return out
+        while True:
+            out = np.zeros(self._components_room, COMPONENT)
+            count = lib.nav_filter_components(self._filter, _components(out), len(out))
+            if count <= len(out):
+                return out[:count]
+            self._components_room = count + count // 4
 
     def region(self, x_m: float, y_m: float) -> tuple[float, float]:
         """Level of the highest-density region in (x, y) that holds this point, and the 90 % region's area in m^2."""

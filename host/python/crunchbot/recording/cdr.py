@@ -5,6 +5,7 @@ as uint32, then its elements (DDS-XTypes 1.3, 7.4.1; DDSI-RTPS 2.5, 10.2).
 """
 
 import struct
+from functools import cache
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -15,6 +16,11 @@ LENGTH = np.dtype("<u4")
 
 class Malformed(ValueError):
     """Bytes that are no such message; says what is wrong with them."""
+
+
+@cache
+def _number(code: str) -> struct.Struct:
+    return struct.Struct(f"<{code}")
 
 
 class Layout:
@@ -74,8 +80,8 @@ class Decoder:
 
     def number(self, code: str) -> float:
         """A number of the struct module's `code`."""
-        size = struct.calcsize(code)
-        return struct.unpack(f"<{code}", self._take(1, size))[0]
+        kind = _number(code)
+        return kind.unpack(self._take(1, kind.size))[0]
 
     def array(self, kind: DTypeLike, count: int) -> np.ndarray:
         """`count` numbers of the NumPy dtype `kind`, an array of their own."""

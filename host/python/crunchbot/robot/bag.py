@@ -22,7 +22,7 @@ from .standard import types
 from .standard.view import KINDS, StandardView
 
 LOOK_S = 0.5
-PLACING = ("/tf", "/map")
+PLACING, PLACED_BY = ("/tf", "/map"), ("odometry", "pose", "map")  # of the standard topics, and what they follow from
 
 
 def metadata(robot: str, scene: Path | None) -> dict[str, str]:
@@ -57,13 +57,16 @@ class Bag:
             if topic not in self._known:
                 self._known.add(topic)
                 self._writer.topic(topic, SCHEMAS[type(one.message)])
-            self._writer.add(topic, self._time(one), encode(one.message))
+            self._writer.add(topic, self._time(one), one.data or encode(one.message))
             self.messages += 1
             self._place(one)
 
     def _place(self, one: Received) -> None:
         """The frames that follow from a message, and at the first row the map."""
         if self._view is None:
+            return
+        if one.topic not in PLACED_BY and (one.topic != "observation" or "/map" in self._known):
+            self._view.note(one.topic, one.message)
             return
         standards = list(self._view.take(one.topic, one.message))
         if one.topic == "observation" and "/map" not in self._known:

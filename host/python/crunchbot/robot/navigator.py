@@ -165,7 +165,8 @@ class Navigator:
         if self._belief_is_due():
             self._report_beliefs(header, step)
         self._step_s = time.monotonic() - began
-        time.sleep(max(0.0, self._settings.drill_step_s - self._step_s))
+        if self._step_s < self._settings.drill_step_s:
+            time.sleep(self._settings.drill_step_s - self._step_s)
 
     def _belief_is_due(self) -> bool:
         """A belief is due at its own pace. In live runs rows go first: a belief that costs much to publish is published less often."""

@@ -16,9 +16,12 @@ def condense(components: np.ndarray, most: int = COMPONENTS_MOST) -> np.ndarray:
     A merged component has the cell's mean pose and mass, and a width that takes in those of its parts and their distances
     (moments kept; sigma_m is that of x and y together, per axis).
     """
-    kept = components[np.argsort(-components["mass"], kind="stable")]
+    mass = np.ascontiguousarray(components["mass"])
+    # Those below an even share of what may be left out are left out, all together: they need not be sorted.
+    heavy = np.flatnonzero(mass >= NEGLECTED * mass.sum() / max(len(mass), 1))
+    kept = components[heavy[np.argsort(-mass[heavy], kind="stable")]]
     held = np.cumsum(kept["mass"])
-    kept = kept[: int(np.searchsorted(held, (1.0 - NEGLECTED) * held[-1])) + 1] if len(kept) else kept
+    kept = kept[: int(np.searchsorted(held, (1.0 - NEGLECTED) * mass.sum())) + 1] if len(kept) else kept
     scale = 1.0
     while len(kept) > most:
         cells = _cells(kept["pose"], scale)

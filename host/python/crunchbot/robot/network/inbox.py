@@ -21,11 +21,12 @@ TOPICS_MOST = 64  # those of all processes' health included
 
 @dataclass(frozen=True)
 class Received:
-    """One message off a stream. `message` is of the topic's class, or an End."""
+    """One message off a stream. `message` is of the topic's class, or an End; `data`: its bytes as they came, if they did."""
 
     topic: str
     message: object
     envelope: Envelope
+    data: bytes = b""
 
     @property
     def over(self) -> bool:
@@ -138,7 +139,7 @@ class Inbox:
             self._check_source(topic, verdict)
             if tally.is_repeated(envelope):
                 return None
-            received = Received(topic, decode(kind, payload, topic), envelope)
+            received = Received(topic, decode(kind, payload, topic), envelope, payload)
             self._check(received)
         except (EnvelopeError, MessageError) as error:
             self.last_error = (

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -93,25 +94,29 @@ class Step:
 
     def last(self) -> Row:
         """The row itself, with what `lead` leaves of the motion."""
-        return to_row(self.row, self._piece(self._count()), self.t_ns)
+        return to_row(self.row, self._piece(self._count), self.t_ns)
 
     def lead(self) -> list[Row]:
         """Rows to be taken before, nothing read in them: the motion of many rows, in as many.
 
         In one, a filter would refuse it, or take the time between for rows whose motion is lost, and assume some more.
         """
-        count = self._count()
+        count = self._count
+        if count == 1:
+            return []
         apart_ns = min(self.within_ns // count, ROW_NS) or PIECE_NS
         last, read = self.last(), np.full(len(self.row.names), NOT_READ, np.uint8)
         times = (round((self.t_ns - (count - n) * apart_ns) / 1e9, 9) for n in range(1, count))
         return [replace(last, t_s=t_s, motion=self._piece(n), cells=read) for n, t_s in enumerate(times, 1)]
 
+    @cached_property
     def _count(self) -> int:
         """How many pieces: one a row, and none that a filter refuses as long as there are not too many."""
-        x, y, turn = self._way()
+        x, y, turn = self._way
         fitting = max(math.ceil(math.hypot(x, y) / MOST_M), math.ceil(abs(turn) / MOST_RAD))
         return max(1, min(max(round(self.within_ns / ROW_NS), fitting), PIECES_MOST))
 
+    @cached_property
     def _way(self) -> np.ndarray:
         """The motion; of more turns than a minute's rows can have, only what is left beside whole ones."""
         x, y, turn = self.motion
@@ -119,7 +124,7 @@ class Step:
 
     def _piece(self, n: int) -> np.ndarray:
         """The n-th, from 1, of a way straight to where the motion ends, turning evenly."""
-        count, way = self._count(), self._way()
+        count, way = self._count, self._way
         return way if count == 1 else between((n - 1) / count * way, n / count * way)
 
 

@@ -4,6 +4,7 @@ rosbags' own decoder is not used here. It names no field, it reads strings witho
 knows no limits: what comes over a network is judged number by number (`ranges`).
 """
 
+import math
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -16,6 +17,9 @@ from ...recording.types import DTYPES, store
 from .ranges import Range
 
 TEXT = "string"
+# Kinds of numbers as the struct module has them.
+CODES = dict(zip(("bool", "byte", "uint8", "int8", "int32", "uint32", "int64", "uint64"), "BBBbiIqQ", strict=True))
+CODES |= {"float32": "f", "float64": "d"}
 ONE, MANY = -1, 0  # of Field.count; other values are the length of a fixed array
 
 
@@ -80,9 +84,11 @@ class Codec:
         if field.count == MANY and count > limits.count:
             raise OutOfRange(f"{count} elements, {limits.count} are the most")
         if field.kind in DTYPES:
+            if field.count == ONE:
+                return _plain(field.kind, _checked(data.number(CODES[field.kind]), limits))
             values = data.array(DTYPES[field.kind], count)
             _check_numbers(values, limits)
-            return _plain(field.kind, values[0]) if field.count == ONE else values
+            return values
         inner = [self._element(data, field, limits, place) for _ in range(count)]
         return inner[0] if field.count == ONE else inner
 
@@ -93,6 +99,13 @@ class Codec:
         if len(text) > limits.high:
             raise OutOfRange(f"{len(text)} characters, {limits.high} are the most")
         return text
+
+
+def _checked(value: float, limits: Range) -> float:
+    """The number itself; OutOfRange when it is not allowed. Most numbers come one by one, where NumPy costs most."""
+    if not (math.isfinite(value) and limits.low <= value <= limits.high):
+        _check_numbers(np.array([value]), limits)
+    return value
 
 
 def _check_numbers(values: np.ndarray, limits: Range) -> None:
@@ -107,5 +120,5 @@ def _check_numbers(values: np.ndarray, limits: Range) -> None:
         raise OutOfRange(f"{values[at]:.6g} is not within {low:.6g} and {high:.6g}")
 
 
-def _plain(kind: str, value: np.generic):
-    return bool(value) if kind == "bool" else value.item()
+def _plain(kind: str, value: float):
+    return bool(value) if kind == "bool" else value

@@ -78,9 +78,12 @@ class StandardView:
         take = getattr(self, f"_take_{topic.partition('/')[0]}", None)
         if take is None or isinstance(message, End):
             return
+        yield from take(message, message.header.stamp.ns, self.note(topic, message))
+
+    def note(self, topic: str, message: Any) -> int:
+        """The wall's time of a message, ns; those of observations set the clock."""
         stamp_ns = message.header.stamp.ns
-        wall_ns = self._clock.row(stamp_ns) if topic == "observation" else self._clock.other(stamp_ns)
-        yield from take(message, stamp_ns, wall_ns)
+        return self._clock.row(stamp_ns) if topic == "observation" else self._clock.other(stamp_ns)
 
     def _take_observation(self, row, _: int, wall_ns: int) -> Iterator[Standard]:
         self._touching = {}
