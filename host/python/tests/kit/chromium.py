@@ -3,9 +3,11 @@
 import asyncio
 import base64
 import json
+import os
 import shutil
+import signal
 import tempfile
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from urllib.request import urlopen
 
@@ -102,17 +104,30 @@ class Browser:
 @asynccontextmanager
 async def browser():
     """A Chromium of its own, with an empty profile; gone afterwards."""
-    with tempfile.TemporaryDirectory(prefix="chromium-", ignore_cleanup_errors=True) as profile:
+    profile = Path(tempfile.mkdtemp(prefix="chromium-"))
+    command = [PROGRAM, *FLAGS, f"--user-data-dir={profile}", "about:blank"]
+    try:
         process = await asyncio.create_subprocess_exec(
-            PROGRAM, *FLAGS, f"--user-data-dir={profile}", "about:blank", stdout=-3, stderr=-3, start_new_session=True
+            *command, stdout=-3, stderr=-3, start_new_session=True, env=os.environ | {"TMPDIR": str(profile)}
         )
         try:
-            address = await _page_address(process, Path(profile) / "DevToolsActivePort")
+            address = await _page_address(process, profile / "DevToolsActivePort")
             async with connect(address, max_size=None) as socket:
                 yield Browser(socket)
         finally:
-            process.terminate()
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
             await process.wait()
+    finally:
+        await _remove(profile)
+
+
+async def _remove(folder: Path) -> None:
+    """Remove a profile. A browser's processes end one after the other, and until then they write into it."""
+    async with asyncio.timeout(PATIENCE_S):
+        while folder.exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            await asyncio.sleep(LOOK_S)
 
 
 async def _page_address(process, port_file: Path) -> str:

@@ -5,6 +5,7 @@ import json
 
 import chromium
 import pytest
+from patience import PATIENCE_S
 from viewkit import page
 from viewpage import DRAWN
 from viewrobot import SCENE, MadeUpRun
@@ -56,6 +57,12 @@ class Stage:
             self.hub.robot.begin_anew()
         for topic, message in self.source.poll():
             self.hub.robot.take(topic, message)
+
+    async def until_at(self, at_s: float) -> None:
+        """Wait until a page's wish for this moment has come: the clock, moved earlier, would have been moved in vain."""
+        async with asyncio.timeout(PATIENCE_S):
+            while self.source.playback()["at_s"] != at_s:
+                await asyncio.sleep(chromium.LOOK_S)
 
     def known(self) -> dict:
         model = self.hub.robot
@@ -137,6 +144,7 @@ def test_the_page_plays_pauses_and_goes_where_one_points(bag, theme, size):
             assert not await b.eval("$('parts').checkVisibility() || $('set-pose').checkVisibility()")
             set_time = "(() => { const s = $('seek'); s.value = 20; s.dispatchEvent(new Event('input')); s.dispatchEvent(new Event('change')); })()"
             await b.eval(set_time)
+            await stage.until_at(20.0)
             stage.now_s += 0.25
             await b.until(f"{DRAWN} && robotPart.player.now.at_s > 20 && $('played').textContent.startsWith('0:20.2')")
             assert await b.eval("$('robot-note').hidden && $('robot-state').textContent") == "▶ recording"
