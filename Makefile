@@ -11,6 +11,9 @@ SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
+# Matrices are small here: a second thread of NumPy's library mostly waits, at full load, and changes the order of sums.
+demo demo-rtl demo-map demo-long test test-all mutants: export OPENBLAS_NUM_THREADS = 1
+
 demo: build ## the whole chain on simulated hardware, magnet to pose: about half a minute; SEED=n chooses the seed
 	@$(PYTHON) -m crunchbot_lab.demo --out build/demo --build-dir $(BUILD) --seed $(SEED)
 

@@ -123,6 +123,8 @@ namespace
 
 constexpr uint64_t PROGRESS_TICKS = WHISKER_LIMIT_CLOCK_HZ / WHISKER_LIMIT_TICK_PERIOD;
 constexpr int IDLE_WAIT_MS = 1000;
+// While there is something to do: to look who has come costs as much as a tick at level bytes.
+constexpr unsigned STEPS_TO_LOOK = 8;
 // A command that has not ended so long after SIGTERM is killed.
 constexpr double END_PATIENCE_S = 30;
 
@@ -172,7 +174,11 @@ int Simulation::run()
     while (!ended()) {
         const bool progress = advance();
         deliver_completed();
-        wait(progress ? 0 : pace_.wait_ms(tick_, IDLE_WAIT_MS));
+        if (!progress) {
+            wait(pace_.wait_ms(tick_, IDLE_WAIT_MS));
+        } else if (++steps_ % STEPS_TO_LOOK == 0) {
+            wait(0);
+        }
     }
     finish();
     return verdict();

@@ -85,7 +85,8 @@ class Simulation
     std::unique_ptr<Child> child_;
     std::array<sim_field, LANES> fields_{};
     uint64_t total_;
-    uint64_t tick_ = 0; // produced so far
+    uint64_t tick_ = 0;  // produced so far
+    unsigned steps_ = 0; // taken, of whatever was due
     bool plugged_ = false;
     bool over_ = false;      // no more ticks; the command has been asked to end
     bool stopped_ = false;   // by a signal

@@ -3,10 +3,14 @@
 import argparse
 import csv
 import json
+import multiprocessing
+import os
 import shutil
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -123,13 +127,19 @@ def prepare(options: argparse.Namespace) -> tuple[Path, scenes.Scene, tuple[floa
 
 
 def replay_seeds(out: Path, scene: scenes.Scene, options: argparse.Namespace) -> None:
-    """seeds.csv: median position errors in other arenas, of the same whiskers and models, at level 1."""
+    """seeds.csv: median position errors in other arenas, of the same whiskers and models, at level 1; all processors at work."""
     seeds = range(options.seed, options.seed + options.spread)
-    rows = []
-    for seed in tqdm(seeds, desc="other seeds, signals", unit="seed"):
-        found = study(seed, options.seconds, out / "models", options.mechanics, scene.simulated)
-        keys = {name: "pose_error_median_m" if name == "grid" else f"{name}_error_median_m" for name in FILTERS}
-        rows.append({"seed": seed} | {f"{name}_m": found[key] for name, key in keys.items()})
+    made = partial(
+        study, seconds=options.seconds, models=out / "models", mechanics=options.mechanics, whiskers=scene.simulated
+    )
+    keys = {name: "pose_error_median_m" if name == "grid" else f"{name}_error_median_m" for name in FILTERS}
+    workers = min(len(seeds), os.cpu_count() or 1)
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        found = list(tqdm(pool.map(made, seeds), "other seeds, signals", len(seeds), unit="seed"))
+    rows = [
+        {"seed": seed} | {f"{name}_m": of_seed[key] for name, key in keys.items()}
+        for seed, of_seed in zip(seeds, found, strict=True)
+    ]
     write_dicts(out / "seeds.csv", ["seed", *(f"{name}_m" for name in FILTERS)], rows)
 
 

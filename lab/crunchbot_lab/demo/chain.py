@@ -14,6 +14,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from crunchbot.pilot.behaviour import BLOCK_TICKS
 from crunchbot.robot.network import link as network
 from crunchbot.robot.network.truth import TruthWatcher
 from crunchbot.robot.processes import parts
@@ -22,6 +23,9 @@ from crunchbot.robot.processes.children import Child, Program
 from ..report.run import FILTERS
 
 FOLLOWERS = 2  # whisker-log and the pilot
+# Frames of a USB transfer. In lock-step nobody waits for a single frame, but each transfer wakes three processes. More than
+# a block would hold the simulation up for good: it goes EFFECT_TICKS beyond the block that the pilot has answered.
+BATCH = BLOCK_TICKS
 POLL_S = 0.05
 LAGGARD_S = 20.0  # for the readers to end after the simulation has
 
@@ -125,7 +129,7 @@ def _bridge(run: ChainRun, table: parts.Table) -> Program:
     simulation += ["--faults", run.out / "faults.csv", "--usb-faults", run.out / "usb_faults.csv"]
     simulation += ["--speed-report", run.out / "speed.json"]
     simulation += ["--rtl-seconds", run.rtl_seconds] if run.level == "mixed" else []
-    daemon = [*table.daemon(), "--sck-divider", run.link.sck_divider]
+    daemon = [*table.daemon(), "--batch", BATCH, "--sck-divider", run.link.sck_divider]
     daemon += ["--word-gap", run.link.word_gap, "--sample-point", run.link.sample_point]
     return Program.of(parts.BRIDGE, [*simulation, "--", *daemon])
 

@@ -12,7 +12,7 @@ namespace bridge_sim
 namespace
 {
 
-constexpr unsigned HOLD_MS = 2;
+constexpr unsigned HOLD_MS = 10;
 constexpr size_t SETUP_BYTES = 8;
 
 UMockdevIoctlData *resolve(UMockdevIoctlData *data, size_t offset, size_t size)
