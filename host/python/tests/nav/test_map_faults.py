@@ -1,0 +1,111 @@
+"""Maps from rows that are broken, missing or many: counted, not read, and in bounded memory."""
+
+import json
+import multiprocessing
+import resource
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crunchbot import cli
+from crunchbot.nav import mapping
+from crunchbot_lab.scenes import map_scoring, write_scene
+from crunchbot_lab.scenes.making import make
+
+ROWS, HALF_HOUR = 600, 18000
+MOST_BYTES = 256e6
+REPRESENTATIONS = ("faces", "grid")
+
+
+def run(made, rows, representation):
+    return mapping.run(made.scene.robot, made.scene.arena.textures, rows, representation=representation)
+
+
+def broken(rows, impossible: bool):
+    """Rows with a tenth of the distances and windows lost, or in their place numbers that no whisker reads; and how many
+    cells that is. The first row is whole."""
+    draw = np.random.default_rng(5)
+    radial, texture = rows.radial_m.copy(), rows.texture.copy()
+    lost, blind = draw.random(radial.shape) < 0.1, draw.random(texture.shape[:2]) < 0.1
+    lost[0], blind[0] = False, False
+    lost &= ~np.isnan(radial)
+    blind &= np.isfinite(texture).all(axis=2)
+    radial[lost] = np.where(draw.random(lost.sum()) < 0.5, -0.01, 9.0) if impossible else np.nan
+    texture[blind] = np.inf if impossible else np.nan
+    cells = int(lost.sum() + blind.sum() * texture.shape[2])
+    return replace(rows, radial_m=radial, texture=texture), cells
+
+
+@pytest.mark.parametrize("representation", REPRESENTATIONS)
+def test_readings_out_of_range_are_counted_and_count_as_not_read(representation):
+    made = make("anchor", 31, ROWS)
+    bad, cells = broken(made.observations, True)
+    missing, _ = broken(made.observations, False)
+    read, unread, whole = (run(made, rows, representation) for rows in (bad, missing, made.observations))
+    assert cells > 100
+    assert (read.bad_cells, unread.bad_cells, whole.bad_cells) == (cells, 0, 0)
+    assert np.array_equal(read.table["pose"], unread.table["pose"])
+    assert np.array_equal(read.table["covariance"], unread.table["covariance"])
+    assert not np.array_equal(read.table["pose"], whole.table["pose"])
+
+
+@pytest.mark.parametrize("representation", (*REPRESENTATIONS, mapping.AUTO))
+def test_a_scene_with_broken_cells_is_mapped_and_they_are_reported(representation, tmp_path, capsys):
+    made = make("anchor", 32, ROWS)
+    bad, cells = broken(made.observations, True)
+    write_scene(tmp_path / "scene", made.scene, bad)
+    words = ["map", str(tmp_path / "scene"), "--out", str(tmp_path / "map"), "--json"]
+    assert cli.main([*words, "--representation", representation]) == 0
+    assert json.loads(capsys.readouterr().out)["bad_cells"] == cells
+
+
+@pytest.mark.parametrize("fault", ["nan-second", "dropped", "reordered", "dead"])
+def test_a_grid_stays_finite_and_about_as_good_as_odometry(fault):
+    made = make(f"anchor+{fault}", 33, 2 * ROWS)
+    rows = made.observations
+    mapped = run(made, rows, "grid")
+    assert np.isfinite(mapped.table["pose"]).all() and np.isfinite(mapped.table["covariance"]).all()
+    mine = map_scoring.trajectory(mapped.table["pose"], rows.truth)["error_median_m"]
+    wheels = map_scoring.trajectory(map_scoring.odometry_path(rows.odometry), rows.truth)["error_median_m"]
+    assert mine < max(1.5 * wheels, 0.1)
+
+
+def test_rows_that_never_came_make_it_less_sure():
+    made = make("anchor", 34, ROWS)
+    rows, kept = made.observations, np.r_[0:300, 360:ROWS]
+    names = ("t_s", "odometry", "texture", "radial_m", "truth")
+    gap = replace(rows, t_text=[rows.t_text[k] for k in kept], **{n: getattr(rows, n)[kept] for n in names})
+    for representation in REPRESENTATIONS:
+        spread = np.trace(run(made, gap, representation).table["covariance"][:, :2, :2], axis1=1, axis2=2)
+        assert spread[300] > 4.0 * spread[299]
+
+
+def half_an_hour(representation, report) -> None:
+    """Peak memory in bytes above that of a few rows, what the mapper says of it, and the work of its rows."""
+    made = make("anchor", 35, HALF_HOUR)
+    few = replace(
+        made.observations, **{n: getattr(made.observations, n)[:2] for n in ("t_s", "t_text", "odometry", "texture")}
+    )
+    few = replace(few, radial_m=few.radial_m[:2], truth=few.truth[:2])
+    mapping.run(made.scene.robot, made.scene.arena.textures, few, particles=1)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    mapped = run(made, made.observations, representation)
+    peak = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+    finite = bool(np.isfinite(mapped.table["pose"]).all())
+    report.send((peak, int(mapped.table["bytes"].max()), mapped.table["evaluations"], finite))
+
+
+@pytest.mark.parametrize("representation", REPRESENTATIONS)
+def test_half_an_hour_takes_bounded_memory_and_no_more_work_a_row(representation):
+    context = multiprocessing.get_context("spawn")  # the peak of this process is that of all tests before
+    here, there = context.Pipe()
+    process = context.Process(target=half_an_hour, args=(representation, there))
+    process.start()
+    there.close()
+    peak, said, evaluations, finite = here.recv()
+    process.join()
+    third = HALF_HOUR // 3
+    assert finite
+    assert peak < MOST_BYTES and said < MOST_BYTES
+    assert evaluations[-third:].max() <= evaluations[:third].max()
