@@ -48,6 +48,7 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
     "touch": "nav.touch",
     "usb": "bridge.usb",
     "view": "host.view",
+    "pace": "bridge.pace",
     "page": "pages",
 }
 # Options of the topics whose full size takes more than some minutes, as `make bench` gives them.

@@ -54,7 +54,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "docs/results/radial_real.md": of(real.page, "radial_real"),
     "docs/results/ring.md": of(studies.ring, "ring"),
     "docs/results/robot.md": partial(parts, robot.page, "robot", ROBOT),
-    "docs/results/simulation.md": of(studies.simulation, "chain_speed", "levels", "levels_shares"),
+    "docs/results/simulation.md": of(studies.simulation, "chain_speed", "levels", "levels_shares", "pace"),
     "docs/results/texture.md": of(texture.page, "texture"),
 }
 

@@ -60,6 +60,7 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tools/benches nav_unseen --leave": (("nav_left_out",), ()),
     "tools/benches node": (("node", "node_cuts", "node_faults"), ("node_age", "node_link", "node_skew")),
     "tools/benches normals": (("nav_normals",), ()),
+    "tools/benches pace": (("pace",), ()),
     "tools/benches radial": (("radial",), ("radial_cost", "radial_fig5")),
     "tools/benches radial --whisker3d DIR": (("radial_real",), ()),
     "tools/benches record": (("record",), ("record_cost",)),

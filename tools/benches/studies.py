@@ -93,7 +93,7 @@ def _localisation(seeds: dict) -> list[list[str]]:
     return rows
 
 
-def simulation(chain: dict, levels: dict, parts: dict) -> str:
+def simulation(chain: dict, levels: dict, parts: dict, pace: dict) -> str:
     """docs/results/simulation.md."""
     whole = [
         ["whole chain to the pilot, SCK/6", str(run["lanes"]), "", f"{run['realtime_factor']:.2f}"]
@@ -121,8 +121,8 @@ def simulation(chain: dict, levels: dict, parts: dict) -> str:
     return (
         head(
             "Speed of the simulation",
-            "`bench/results/chain_speed.json`, `levels.json` and `levels_shares.json`",
-            "`tools/benches chain` and `tools/benches levels`",
+            "`bench/results/chain_speed.json`, `levels.json`, `levels_shares.json` and `pace.json`",
+            "`tools/benches chain`, `tools/benches levels` and `tools/benches pace`",
         )
         + "\n## The chain at RTL level\n\n"
         "Simulated seconds per second of wall time. The whole chain: gateware, USB, libusb, `whiskerd`, ring, pilot "
@@ -136,6 +136,13 @@ def simulation(chain: dict, levels: dict, parts: dict) -> str:
         "![Simulated seconds per processor second of both levels](../charts/levels_speed.svg)\n\n"
         + table(["lanes", *cases, *(f"{cases[0]} / {case}" for case in cases[1:])], by_lanes)
         + _parts(parts)
+        + "\n## What a clock cycle costs elsewhere\n\n"
+        "Simulated clock cycles per second of processor time. A node sleeps in most of its cycles; simavr packs and "
+        "parses the firmware's record without a pause. The bridge has its USB device, nodes and a host that checks every "
+        "frame; under cocotb, on the same Verilator, it has none of them and nothing drives it but its clock: one "
+        "coroutine waits for many cycles, or for each. It is built as the benches of `fpga/tb` are, with Verilator's own "
+        "library compiled without optimisation.\n\n"
+        + table(["simulator", "million cycles a second"], [[name, f"{pace[name] / 1e6:.3g}"] for name in sorted(pace)])
     )
 
 
