@@ -164,6 +164,6 @@ def _why_not(address: str, port: int, error: OSError) -> str:
             return f"{place}: port in use, perhaps by another whisker-view; choose another --port (0: a free one)"
         case errno.EACCES:
             return f"{place}: no permission for this port; choose a --port above 1023"
-        case errno.EADDRNOTAVAIL:
+        case errno.EADDRNOTAVAIL | None:  # None: asyncio, from Python 3.13 on, when no address could be taken
             return f"{place}: not an address of this machine; choose another --host"
-    return f"{place}: cannot be served ({os.strerror(error.errno or 0)}); choose another --host or --port"
+    return f"{place}: cannot be served ({os.strerror(error.errno)}); choose another --host or --port"
