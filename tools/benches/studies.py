@@ -136,7 +136,7 @@ def simulation(chain: dict, levels: dict, parts: dict, pace: dict) -> str:
         "![Simulated seconds per processor second of both levels](../charts/levels_speed.svg)\n\n"
         + table(["lanes", *cases, *(f"{cases[0]} / {case}" for case in cases[1:])], by_lanes)
         + _parts(parts)
-        + "\n## What a clock cycle costs elsewhere\n\n"
+        + "\n## What a clock cycle costs in other simulators\n\n"
         "Simulated clock cycles per second of processor time. A node sleeps in most of its cycles; simavr packs and "
         "parses the firmware's record without a pause. The bridge has its USB device, nodes and a host that checks every "
         "frame; under cocotb, on the same Verilator, it has none of them and nothing drives it but its clock: one "
