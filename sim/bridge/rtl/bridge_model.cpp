@@ -27,12 +27,13 @@ void evaluate(Vclocked_bridge___024root &root, uint64_t edge)
 } // namespace
 
 BridgeModel::BridgeModel(NodeBus &bus, NorFlash &flash)
-    : bus_(bus), flash_(flash), top_(std::make_unique<Vclocked_bridge>())
+    : bus_(bus), flash_(flash), top_(std::make_unique<Vclocked_bridge>()), control_(*top_->rootp)
 {
     top_->tick_external = 1;
     top_->tick_strobe = 0;
     top_->miso = UINT32_MAX >> (32 - LANES);
     top_->eval();
+    control_.settle();
     reset();
 }
 
@@ -71,9 +72,20 @@ void BridgeModel::run_nodes()
     busy_ = link_busy();
 }
 
+uint64_t BridgeModel::control_edges() const
+{
+    return control_.edges();
+}
+
 bool BridgeModel::sync() const
 {
     return top_->sync;
+}
+
+unsigned BridgeModel::pins() const
+{
+    return top_->sync << 6 | top_->select_n << 5 | top_->sck << 4 | top_->mosi << 3 | top_->flash_cs_n << 2 |
+           top_->flash_sck << 1 | top_->flash_mosi;
 }
 
 bool BridgeModel::link_busy() const
@@ -149,8 +161,8 @@ uint32_t BridgeModel::frames_dropped() const
 }
 
 // One evaluation (clocked_bridge.v): the edge that ended the cycle before, then the outputs of this one. The falling
-// edge clocks nothing but the flash. The node wires answer in between: a record's bit is on MISO at the first edge
-// after the SCK edge that shifted it out.
+// edge clocks nothing but the flash's SCK, which a reset may find high. The node wires answer in between: a record's
+// bit is on MISO at the first edge after the SCK edge that shifted it out.
 void BridgeModel::cycle()
 {
     Vclocked_bridge &top = *top_;
@@ -160,7 +172,8 @@ void BridgeModel::cycle()
     top.utmi_tx_ready = in.tx_ready;
     top.utmi_line_state = in.line_state;
     evaluate(*top.rootp, RISING);
-    if (!top.flash_cs_n) {
+    control_.edge();
+    if (!top.flash_cs_n || top.flash_sck) {
         evaluate(*top.rootp, FALLING);
     }
     out.tx_data = top.utmi_tx_data;

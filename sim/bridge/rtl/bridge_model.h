@@ -5,6 +5,7 @@
 
 #include "bytes_settings.h"
 #include "flash/nor_flash.h"
+#include "gated_control.h"
 #include "node_bus.h"
 #include "sampling_state.h"
 #include "utmi.h"
@@ -35,11 +36,15 @@ class BridgeModel : public UtmiDevice
 
     // As they are in the cycle that begins.
     bool sync() const;               // the pin
+    unsigned pins() const;           // to nodes and flash: sync, select_n, sck, mosi, flash_cs_n, _sck, _mosi as bits
     bool link_busy() const;          // SYNC and transfer on the node link in progress
     bool running() const;            // from start until the last frame is in the FIFO
     uint32_t frames_dropped() const; // since start
     bool every_frame() const;        // each frame ends its packet
     uint32_t tick_period() const;    // cycles
+
+    // Of `cycles`, those in which the control endpoint was evaluated.
+    uint64_t control_edges() const;
 
     // At level bytes a run of plain sampling may go on from here, between two ticks with no frame in the bridge; it
     // comes back as far as it has come, at such a time.
@@ -53,6 +58,7 @@ class BridgeModel : public UtmiDevice
     NodeBus &bus_;
     FlashPins flash_;
     std::unique_ptr<Vclocked_bridge> top_;
+    GatedControl control_;
     bool free_ = false;  // ticks by itself
     bool busy_ = false;  // the link was, a cycle ago
     bool ended_ = false; // its transfer has
