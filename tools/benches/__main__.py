@@ -28,6 +28,7 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
     "image": "node.image",
     "levels": "bridge.levels",
     "map": "nav.maps",
+    "map_peers": "nav.map_peers",
     "map_representations": "nav.map_representations",
     "mechanics": "mechanics.bench",
     "nav": "nav.bench",

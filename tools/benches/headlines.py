@@ -237,6 +237,7 @@ STUDIES = {  # page, what it holds
     "results/nav.md": "navigation: every filter, fault by fault; locks, bounds, cost",
     "results/nav_unseen.md": "families of scenes that no filter was made for",
     "results/map.md": "an unknown arena: a map by touch alone, and the pose in it",
+    "results/map_peers.md": "other projects' SLAM on rows of touch, and on laser logs with beams cut short",
     "results/map_representations.md": "maps of faces, grids in particles, a factor graph: error against cost",
     "results/nav_size.md": "a start unknown, by the size of the arena",
     "results/nav_active.md": "where to touch next: a planner beside random exploration, in closed loop",

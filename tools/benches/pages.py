@@ -10,7 +10,7 @@ from pathlib import Path
 from . import headlines, studies
 from .contact import page as contact
 from .mechanics import edges
-from .nav import active, map_representations, maps, normals, size, unseen
+from .nav import active, map_peers, map_representations, maps, normals, size, unseen
 from .nav import page as nav
 from .node import image
 from .node import page as node
@@ -45,6 +45,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "docs/results/nav_normals.md": of(normals.page, "nav_normals"),
     "docs/results/nav_paper.md": of(studies.nav_paper, "nav_paper"),
     "docs/results/map.md": of(maps.page, "map"),
+    "docs/results/map_peers.md": of(map_peers.page, "map_peers"),
     "docs/results/map_representations.md": of(map_representations.page, "map_representations"),
     "docs/results/nav_size.md": of(size.page, "nav_size"),
     "docs/results/nav_unseen.md": of(unseen.page, "nav_unseen", "nav_designs", "nav_ablations", "nav_left_out"),

@@ -136,17 +136,23 @@ def python_entries(most: int) -> list[Entry]:
     ]
 
 
-def mrpt_entries(build: Path, most: int) -> list[Entry]:
-    """Builds the program if MRPT is there."""
+def built(build: Path, program: str) -> Path | None:
+    """Builds the native peers; None: this one cannot be had, and is left out with its error."""
     library = next(iter(sorted(build.rglob("libwhisker-nav.a"))), None)
     cmake = ("cmake", "-S", PEERS, "-B", NATIVE, f"-DNAV_LIBRARY={library}")
     if error := store.failure(cmake, ("cmake", "--build", NATIVE)):
         store.leave_out("MRPT, programs of one's own", f"{PEERS.relative_to(ROOT)} does not build: {error}")
-        return []
-    if not (NATIVE / "mrpt_peer").exists():
+        return None
+    if not (NATIVE / program).exists():
         store.leave_out("MRPT", f"not installed; {APT}")
+        return None
+    return NATIVE / program
+
+
+def mrpt_entries(build: Path, most: int) -> list[Entry]:
+    peer = built(build, "mrpt_peer")
+    if not peer:
         return []
-    peer = NATIVE / "mrpt_peer"
     sizes = [Entry("mrpt standard", str(n), most, native(peer, "--particles", n)) for n in (100, 500, 2000)]
     kld = Entry("mrpt standard", "300-20000 KLD", most, native(peer, "--particles", 20000, "--kld", 20000))
     others = [
