@@ -19,18 +19,6 @@ void Vcontrol_endpoint___024root___eval_nba(Vcontrol_endpoint___024root *root);
 namespace bridge_sim
 {
 
-namespace
-{
-
-template <class Port> bool copy(Port &to, const Port &from)
-{
-    const bool moves = to != from;
-    to = from;
-    return moves;
-}
-
-} // namespace
-
 GatedControl::GatedControl(Vclocked_bridge___024root &bridge)
     : bridge_(bridge), model_(std::make_unique<Vcontrol_endpoint>()), before_(sizeof(Vcontrol_endpoint___024root))
 {
@@ -73,22 +61,31 @@ uint64_t GatedControl::edges() const
     return edges_;
 }
 
+// Most often nothing has moved, and nothing is written.
 bool GatedControl::inputs_moved()
 {
-    bool moved = false;
-#define COPY(port) moved |= copy(model_->port, SLOT(port));
+    uint64_t moved = 0;
+#define COMPARE(port) moved |= model_->port ^ SLOT(port);
+    CUT_INPUTS(COMPARE)
+#undef COMPARE
+    if (moved == 0) {
+        return false;
+    }
+#define COPY(port) model_->port = SLOT(port);
     CUT_INPUTS(COPY)
 #undef COPY
-    return moved;
+    return true;
 }
 
 bool GatedControl::outputs_moved()
 {
-    bool moved = false;
-#define COPY(port) moved |= copy(SLOT(port), model_->port);
+    uint64_t moved = 0;
+#define COPY(port)                                                                                                     \
+    moved |= model_->port ^ SLOT(port);                                                                                \
+    SLOT(port) = model_->port;
     CUT_OUTPUTS(COPY)
 #undef COPY
-    return moved;
+    return moved != 0;
 }
 
 // Registers, inputs and all between them are members of the model.
