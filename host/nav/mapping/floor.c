@@ -105,8 +105,6 @@ static void floor_look(const struct nav_floor *f, const struct nav_joint *j, dou
     nav_linear_add(&v->form, NAV_JOINT_PITCH, -sign * (first ? line_u : line_w));
 }
 
-/* The window is of the tip's own tile with the probability that the tip is on this side; the moments of the Gaussian
- * that comes nearest to the product (assumed-density filtering). */
 static void floor_forget(struct nav_floor *f)
 {
     memset(f->tile, 0, (size_t)NAV_FLOOR_SIDE * NAV_FLOOR_SIDE * (size_t)f->classes * sizeof *f->tile);
@@ -131,6 +129,8 @@ void nav_floor_at(const struct nav_floor *f, const struct nav_joint *j, double x
     *row = v.row;
 }
 
+/* The window is of the tip's own tile with the probability that the tip is on this side; the moments of the Gaussian
+ * that comes nearest to the product (assumed-density filtering). */
 double nav_floor_take(struct nav_floor *f, struct nav_joint *j, double x, double y, const float *ratio)
 {
     struct floor_view v;
