@@ -83,10 +83,10 @@ def examples() -> dict[str, str]:
 EXAMPLES = examples()
 
 
-def run(line: str, place: Path, seconds: float | None = None) -> tuple[int, str]:
-    """A line of a shell: exit code and output. seconds: Ctrl-C comes after so long; None: it ends by itself."""
+def started(line: str, place: Path) -> subprocess.Popen[str]:
+    """A line of a shell, in a process group of its own; all that it prints goes to its stdout."""
     environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "BROWSER": "true"}
-    process = subprocess.Popen(
+    return subprocess.Popen(
         ["sh", "-c", line],
         cwd=place,
         env=environment,
@@ -95,6 +95,11 @@ def run(line: str, place: Path, seconds: float | None = None) -> tuple[int, str]
         stderr=subprocess.STDOUT,
         start_new_session=True,
     )
+
+
+def run(line: str, place: Path, seconds: float | None = None) -> tuple[int, str]:
+    """A line of a shell: exit code and output. seconds: Ctrl-C comes after so long; None: it ends by itself."""
+    process = started(line, place)
     try:
         out, _ = process.communicate(timeout=seconds or PATIENCE_S)
     except subprocess.TimeoutExpired:

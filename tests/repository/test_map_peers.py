@@ -60,7 +60,25 @@ def test_beams_of_a_log_are_cut_and_its_wheels_are_its_odometry(tmp_path):
     assert poses[-1] == pytest.approx([7.9, 0.0, 0.0])
 
 
-def test_a_file_that_is_no_log_is_one_line(tmp_path):
-    (tmp_path / "hall.log").write_text("nothing\n")
-    with pytest.raises(SystemExit, match="hall.log: no lines of ODOM and FLASER"):
+SCAN = "FLASER 2 1 1 0 0 0 0 0 0 0 host 0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("nothing\n", "hall.log: no lines of ODOM and FLASER"),
+        ("ODOM 0 0\n", "hall.log:1: ODOM: "),
+        ("FLASER many\n", "hall.log:1: FLASER: "),
+        ("FLASER 9 1 1\n", "hall.log:1: FLASER: "),
+        (SCAN + SCAN.replace("2 1 1", "3 1 1 1"), "hall.log:2: FLASER: 3 beams, 2 before"),
+    ],
+)
+def test_a_file_that_is_no_log_is_one_line(text, said, tmp_path):
+    (tmp_path / "hall.log").write_text(text)
+    with pytest.raises(SystemExit, match=said):
+        map_peers.scans(tmp_path / "hall.log")
+
+
+def test_a_log_that_is_not_there_is_one_line(tmp_path):
+    with pytest.raises(SystemExit, match="hall.log: .*; give --log a log"):
         map_peers.scans(tmp_path / "hall.log")

@@ -6,15 +6,14 @@ import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
+import threading
 from pathlib import Path
 
 import pytest
 from chainrun import BUILD
 from keykit import certificates, documented
 from linkkit import free_port
-from test_examples import FOREVER, PATIENCE_S, RING, bridge, check, place, with_own_names
+from test_examples import FOREVER, PATIENCE_S, RING, bridge, check, place, started, with_own_names
 from test_page_commands import ALL
 from thymiologs import write_published
 
@@ -31,6 +30,7 @@ FILES = {  # what the pages' commands read, by what stands for it
     "scenes/run1": "examples/scene",
     "scenes/robot": "examples/scene",
     "SCENE": "examples/scene",
+    "scenes/mine": "examples/scene",
     "MODELS/texture.json": "examples/texture.json",
     **{f"{name}{n}.json": "examples/radial.json" for name in ("MODELS/object", "models/object_") for n in (1, 2, 3, 4)},
     "firmware/images/mlx90333/node.whex": "examples/node.whex",
@@ -219,23 +219,17 @@ def test_a_command_without_hardware(desk, nothing_plugged, line):
 def said_until(line: str, wanted: str, folder: Path) -> tuple[str, int]:
     """What a command printed, with its exit code; Ctrl-C comes once it has printed what is wanted."""
     wrapped = line if "bridge-sim" in line else f"umockdev-wrapper {line}"
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
-    process = subprocess.Popen(
-        ["sh", "-c", f"exec {wrapped}"],
-        cwd=folder,
-        env=environment,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,
-    )
+    process = started(f"exec {wrapped}", folder)
+    too_long = threading.Timer(PATIENCE_S, os.killpg, (process.pid, signal.SIGKILL))
+    too_long.start()
     said = ""
     for printed in process.stdout:
         said += printed
         if wanted in said:
             process.send_signal(signal.SIGINT)
             break
-    rest, _ = process.communicate(timeout=PATIENCE_S)
+    rest, _ = process.communicate()
+    too_long.cancel()
     return said + rest, process.returncode
 
 

@@ -171,15 +171,15 @@ def adopt(names: list[str], folder: Path = RESULTS) -> None:
         path.write_text(json.dumps(origins, indent=1) + "\n")
 
 
-def write_chart(name: str, drawn: Figure | str, folder: Path = CHARTS) -> None:
-    """A figure, or the text of one that is SVG already."""
+def write_chart(name: str, drawn: Figure | str, folder: Path = CHARTS, *, letters: bool = False) -> None:
+    """A figure, or the text of one that is SVG already. letters: its words are written as text, not as outlines."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.svg"
     if isinstance(drawn, str):
         path.write_text(drawn)
         return
     salt = matplotlib.rcParams["svg.hashsalt"] or "whisker"
-    with matplotlib.rc_context({"svg.hashsalt": salt}):
+    with matplotlib.rc_context({"svg.hashsalt": salt} | ({"svg.fonttype": "none"} if letters else {})):
         drawn.savefig(path, metadata={"Date": None})
 
 

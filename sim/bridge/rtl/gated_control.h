@@ -1,4 +1,4 @@
-// The control endpoint of the USB device, a quarter of the bridge's logic, as a model of its own. It is evaluated only
+// The control endpoint of the USB device as a model of its own. It is evaluated only
 // in cycles in which something can change: while its registers and its inputs are those of the cycle before, the next
 // clock edge would leave them as they are.
 #pragma once

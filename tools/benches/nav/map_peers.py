@@ -63,26 +63,26 @@ def scene(family: str, seed: int) -> Rows:
     return made.scene.robot, made.scene.arena.textures, made.observations
 
 
-def _numbers(path: Path, lineno: int, words: list[str]) -> list[float]:
-    try:
-        return [float(word) for word in words]
-    except ValueError as error:
-        raise SystemExit(f"{path}:{lineno}: {error}; give a log in CARMEN's format") from error
-
-
 def scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of a log: ranges (n, beams), true poses (n, 3), poses by odometry at the same times (n, 3)."""
     wheels, ranges, truth = [], [], []
-    for lineno, line in enumerate(path.read_text().splitlines(), 1):
+    try:
+        lines = path.read_text().splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise SystemExit(f"{path}: {error}; give --log a log in CARMEN's format") from error
+    for lineno, line in enumerate(lines, 1):
         words = line.split()
-        if words[:1] == ["ODOM"]:
-            x, y, turn, *_, t_s = _numbers(path, lineno, [*words[1:4], words[7]])
-            wheels.append((t_s, x, y, turn))
-        elif words[:1] == ["FLASER"]:
-            beams = int(words[1])
-            ranges.append(_numbers(path, lineno, words[2 : 2 + beams]))
-            pose = words[2 + beams :]
-            truth.append(_numbers(path, lineno, [*pose[:3], pose[6]]))
+        try:
+            if words[:1] == ["ODOM"]:
+                wheels.append([float(words[at]) for at in (7, 1, 2, 3)])
+            elif words[:1] == ["FLASER"]:
+                beams = int(words[1])
+                truth.append([float(words[2 + beams + at]) for at in (0, 1, 2, 6)])
+                ranges.append([float(word) for word in words[2 : 2 + beams]])
+                if beams != len(ranges[0]):
+                    raise ValueError(f"{beams} beams, {len(ranges[0])} before")
+        except (ValueError, IndexError) as error:
+            raise SystemExit(f"{path}:{lineno}: {words[0]}: {error}; give a log in CARMEN's format") from error
     if not wheels or not truth:
         raise SystemExit(f"{path}: no lines of ODOM and FLASER; give a corrected log in CARMEN's format")
     order = sorted(wheels)
@@ -295,8 +295,7 @@ def page(data: dict) -> str:
 def run(build: Path, seeds: int = 3, workers: int = WORKERS, log: list[Path] | None = None) -> None:
     data = measure(build, seeds, workers, log or [])
     store.write_result("map_peers", data)
-    with matplotlib.rc_context({"svg.hashsalt": "whisker", "svg.fonttype": "none"}):
-        store.write_chart("map_peers", chart(data))
+    store.write_chart("map_peers", chart(data), letters=True)
     store.write_page(store.ROOT / "docs/results/map_peers.md", page(data))
 
 

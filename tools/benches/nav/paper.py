@@ -10,7 +10,6 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from tqdm import tqdm
 
@@ -299,9 +298,8 @@ def run(_build: Path) -> None:
         "nav_fig6c": lambda: charts.crossing(c, CROSS),
         "nav_banana": lambda: charts.banana(claim),
     }
-    with matplotlib.rc_context({"svg.hashsalt": "whisker", "svg.fonttype": "none"}):
-        for name, draw in drawn.items():
-            store.write_chart(name, draw())
+    for name, draw in drawn.items():
+        store.write_chart(name, draw(), letters=True)
     examples = [{key: e[key] for key in ("row", "share", "peaks", "mode_moved")} for e in b["examples"]]
     result = {
         "fig6a": {"rows": a["rows"].tolist(), "jumps": a["jumps"]},
