@@ -30,6 +30,7 @@ REPRESENTATIONS: dict[str, type[Mapper] | type[GraphMapper]] = {
     "graph": GraphMapper,
 }
 AUTO = "auto"  # faces or grid, whichever the evidence is for
+CARRIED_NATS = math.log(1e4)  # against a kidnap, one in so many rows, as host/nav/mapping/maps/kidnap.c has it
 GREYS = {FREE: 254, SOLID: 0}  # of ROS; any other cell is 205
 GREY_UNKNOWN = 205
 
@@ -126,16 +127,14 @@ def _chosen(
     lattice: bool,
     quiet: bool,
 ) -> Mapped:
-    """Faces or grid, by the evidence of their paths. That the robot was carried off is noticed by the faces alone, and in
-    their frames after that a grid's path has no place: then they are taken without evidence. Each pose is from the rows
-    until then; which of the two is taken, from all. Times are those of both and of comparing them."""
+    """Faces or grid, by the evidence of their paths. Faces alone notice that the robot was carried off: each such time
+    costs them its prior, and a map that was not joined is one of its own. Each pose is from the rows until then; which of the
+    two is taken, from all. Times are those of both and of comparing them."""
     faces = run(robot, textures, rows, seed, particles, lattice, quiet)
-    if len(faces.parts) > 1:
-        return faces
     grid = run(robot, textures, rows, seed, None, lattice, quiet, "grid")
     begun = time.thread_time()
-    by_faces, by_grid = (evidence_of(robot, textures, rows, mapped.table).sum() for mapped in (faces, grid))
-    evidence = float(by_faces - by_grid)
+    by_faces, by_grid = (evidence_of(robot, textures, rows, m.table, m.frame).sum() for m in (faces, grid))
+    evidence = float(by_faces - by_grid) - CARRIED_NATS * (len(faces.parts) - 1)
     spent = 1e6 * (time.thread_time() - begun) / max(len(rows), 1)
     taken = faces if evidence >= 0.0 else grid
     return replace(taken, step_us=faces.step_us + grid.step_us + spent, evidence=abs(evidence))

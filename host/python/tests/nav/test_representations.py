@@ -115,9 +115,23 @@ def test_what_is_taken_follows_the_evidence(made, monkeypatch, faces, grid, take
     assert (run.step_us > 0.0).all()
 
 
-def test_a_robot_that_was_carried_off_is_the_faces(made, monkeypatch):
-    parts = [Part(0, 0, 0, None, None, None), Part(1, 50, 60, None, None, None)]
-    monkeypatch.setattr(Mapper, "parts", lambda _: parts)
+def test_a_second_map_of_the_same_place_has_less_evidence(made):
+    robot, textures, rows = made.scene.robot, made.scene.arena.textures, made.observations
+    truth = along(from_map(rows.truth, tuple(rows.truth[0])))
+    one, two = (evidence_of(robot, textures, rows, truth, frame) for frame in (None, np.arange(ROWS) // (ROWS // 2)))
+    assert np.array_equal(one[: ROWS // 2], two[: ROWS // 2])
+    assert one.sum() > two.sum() + 100.0
+
+
+def test_a_robot_that_was_carried_off_is_the_faces():
+    made = make("anchor+carried", 5, 3000)
+    run = mapping.run(made.scene.robot, made.scene.arena.textures, made.observations, representation=mapping.AUTO)
+    assert len(run.parts) == 2 and run.representation == "faces" and run.evidence > 0.0
+
+
+def test_a_kidnap_that_was_none_is_the_grid(made, monkeypatch):
+    """One that faces alone say costs them its prior."""
+    monkeypatch.setattr(mapping, "evidence_of", lambda *_: np.zeros(ROWS))
+    monkeypatch.setattr(Mapper, "parts", lambda _: [Part(0, 0, 0, None, None, None), Part(1, 50, 60, None, None, None)])
     options = (made.scene.robot, made.scene.arena.textures, made.observations)
-    run = mapping.run(*options, representation=mapping.AUTO)
-    assert (run.representation, run.evidence) == ("faces", None)
+    assert mapping.run(*options, representation=mapping.AUTO).representation == "grid"
