@@ -92,11 +92,8 @@ uint64_t lane_order(uint8_t tick)
 }
 
 /* The bridge reads MISO just before the falling edge. */
-static void lane_bench_plan_bit(struct lane_bench *bench, unsigned i, bool reaches_node, uint64_t at_fs)
+static void lane_bench_plan_bit(struct lane_bench *bench, unsigned i, bool mosi, bool reaches_node, uint64_t at_fs)
 {
-    const struct lane_faults *f = &bench->faults;
-    const bool sent = i < BITS && (lane_order((uint8_t)bench->tick) ^ f->mosi_flips) >> (BITS - 1u - i) & 1u;
-    const bool mosi = f->mosi_stuck ? f->mosi_level : sent;
     if (reaches_node)
         lane_bench_add(bench, at_fs, SCK_EDGE, true, mosi);
     if (i < BITS)
@@ -110,6 +107,7 @@ static void lane_bench_plan_transfer(struct lane_bench *bench, uint64_t select_f
     const struct lane_timing *t = &bench->timing;
     const struct lane_faults *f = &bench->faults;
     const unsigned clocks = (unsigned)((int32_t)BITS + f->extra_clocks);
+    const uint64_t order = lane_order((uint8_t)bench->tick) ^ f->mosi_flips;
     uint64_t at = select_fs + t->setup_fs;
     lane_bench_add(bench, select_fs, START, false, false);
     if (!f->no_select)
@@ -119,7 +117,8 @@ static void lane_bench_plan_transfer(struct lane_bench *bench, uint64_t select_f
             lane_bench_add(bench, at - GLITCH_FS, SELECT_EDGE, true, false);
             lane_bench_add(bench, at - GLITCH_FS / 2u, SELECT_EDGE, false, false);
         }
-        lane_bench_plan_bit(bench, i, i < clocks, at);
+        const bool sent = i < BITS && order >> (BITS - 1u - i) & 1u;
+        lane_bench_plan_bit(bench, i, f->mosi_stuck ? f->mosi_level : sent, i < clocks, at);
         at += 2u * t->half_fs + (i % 16u == 15u ? t->gap_fs : 0u);
     }
     if (!f->select_stays)
