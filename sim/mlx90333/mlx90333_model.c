@@ -283,6 +283,34 @@ bool mlx90333_clock(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool m
     return seen;
 }
 
+static bool mlx90333_model_equal_wires(const struct mlx90333 *a, const struct mlx90333 *b)
+{
+    return a->select == b->select && a->select_ns == b->select_ns && a->rise_ns == b->rise_ns &&
+           a->fall_ns == b->fall_ns && a->level == b->level && a->fresh == b->fresh && a->slipped == b->slipped &&
+           a->dropping == b->dropping && a->dark == b->dark;
+}
+
+static bool mlx90333_model_equal_frame(const struct mlx90333 *a, const struct mlx90333 *b)
+{
+    return a->enabled == b->enabled && a->answering == b->answering && a->byte == b->byte && a->bit == b->bit &&
+           a->sending == b->sending && a->received == b->received && memcmp(a->frame, b->frame, sizeof a->frame) == 0;
+}
+
+/* A start-up that ended before the last edge of /SS leaves nothing behind. */
+static bool mlx90333_model_equal_start(const struct mlx90333 *a, const struct mlx90333 *b)
+{
+    const bool both_over = a->awake_ns <= a->select_ns && b->awake_ns <= b->select_ns;
+    return (both_over || (a->awake_ns == b->awake_ns && a->restarting == b->restarting)) &&
+           a->reset_due == b->reset_due;
+}
+
+bool mlx90333_equal(const struct mlx90333 *a, const struct mlx90333 *b)
+{
+    return a->fault == SIM_SENSOR_GOOD && b->fault == SIM_SENSOR_GOOD && mlx90333_model_equal_wires(a, b) &&
+           mlx90333_model_equal_frame(a, b) && mlx90333_model_equal_start(a, b) &&
+           mlx90333_sense_equal(&a->sense, &b->sense);
+}
+
 uint32_t mlx90333_violations(const struct mlx90333 *sensor)
 {
     uint32_t sum = 0;

@@ -96,6 +96,10 @@ bool mlx90333_clock(struct mlx90333 *sensor, uint64_t now_ns, bool level, bool m
 /* The frame that a master reads who keeps to the data sheet, latched at `latch_ns`: without wires, or their faults. */
 const uint8_t *mlx90333_read(struct mlx90333 *sensor, uint64_t latch_ns);
 
+/* Two sensors without a fault, on the same wires, do the same from now on, but for what chance decides: whether a short
+ * pause of /SS resynchronises. They may have counted other violations. */
+bool mlx90333_equal(const struct mlx90333 *a, const struct mlx90333 *b);
+
 /* All violations of the master's so far. */
 uint32_t mlx90333_violations(const struct mlx90333 *sensor);
 

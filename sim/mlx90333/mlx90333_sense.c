@@ -50,6 +50,16 @@ void mlx90333_sense_start(struct mlx90333_sense *sense, const struct mlx90333_pa
     sense->next_ns = now_ns + (uint64_t)(mlx90333_sense_uniform(sense) * (double)sense->period_ns);
 }
 
+bool mlx90333_sense_equal(const struct mlx90333_sense *a, const struct mlx90333_sense *b)
+{
+    const struct mlx90333_field *f = &a->field, *g = &b->field;
+    return a->random == b->random && a->next_ns == b->next_ns && a->period_ns == b->period_ns &&
+           a->last_ns == b->last_ns && a->errors == b->errors && memcmp(a->taps, b->taps, sizeof a->taps) == 0 &&
+           f->since_ns == g->since_ns && f->is_vector == g->is_vector && f->alpha_deg == g->alpha_deg &&
+           f->beta_deg == g->beta_deg && f->alpha_deg_s == g->alpha_deg_s && f->beta_deg_s == g->beta_deg_s &&
+           memcmp(f->vector_mt, g->vector_mt, sizeof f->vector_mt) == 0;
+}
+
 void mlx90333_angles(const struct mlx90333_parameters *p, const double b[3], double angles_deg[2])
 {
     angles_deg[0] = atan2(hypot(p->k_alpha * b[2], p->k_t * b[1]), b[0]) * DEG - 90.0;

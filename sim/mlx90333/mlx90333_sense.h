@@ -36,6 +36,9 @@ void mlx90333_sense_field(struct mlx90333_sense *sense, const struct mlx90333_fi
  * Returns the age of the conversion, ns. */
 uint64_t mlx90333_sense_latch(struct mlx90333_sense *sense, uint64_t now_ns, uint16_t words[3], uint16_t *errors);
 
+/* The same field gives the same words from now on; of the parameters `a` and `b` have their own. */
+bool mlx90333_sense_equal(const struct mlx90333_sense *a, const struct mlx90333_sense *b);
+
 /* alpha = atan2(sqrt((k_alpha Bz)^2 + (k_t By)^2), Bx), beta = atan2(sqrt((k_beta Bz)^2 + (k_t Bx)^2), By), both minus
  * 90 degrees: from rest, where the field is along Z. Source: facts sheet of the MLX90363, whose names and ranges agree.
  */

@@ -193,6 +193,80 @@ static void without_the_parameter_an_error_ends_in_no_reset(void **state)
     assert_frame(frame, 12.0, 34.0, 0);
 }
 
+/* What a sensor remembers, but for what it has counted, when it latched, and its chances. */
+#define REMEMBERED(X)                                                                                                  \
+    X(select)                                                                                                          \
+    X(select_ns)                                                                                                       \
+    X(rise_ns)                                                                                                         \
+    X(fall_ns)                                                                                                         \
+    X(fresh)                                                                                                           \
+    X(enabled)                                                                                                         \
+    X(answering)                                                                                                       \
+    X(level)                                                                                                           \
+    X(byte)                                                                                                            \
+    X(bit)                                                                                                             \
+    X(sending)                                                                                                         \
+    X(received)                                                                                                        \
+    X(reset_due)                                                                                                       \
+    X(dropping)                                                                                                        \
+    X(dark)                                                                                                            \
+    X(slipped)                                                                                                         \
+    X(frame[7])                                                                                                        \
+    X(fault)                                                                                                           \
+    X(sense.field.since_ns)                                                                                            \
+    X(sense.field.alpha_deg)                                                                                           \
+    X(sense.field.beta_deg)                                                                                            \
+    X(sense.field.alpha_deg_s)                                                                                         \
+    X(sense.field.beta_deg_s)                                                                                          \
+    X(sense.field.vector_mt[2])                                                                                        \
+    X(sense.field.is_vector)                                                                                           \
+    X(sense.taps[4][1])                                                                                                \
+    X(sense.next_ns)                                                                                                   \
+    X(sense.period_ns)                                                                                                 \
+    X(sense.last_ns)                                                                                                   \
+    X(sense.random)                                                                                                    \
+    X(sense.errors)
+
+static void sensors_that_remember_different_things_are_not_equal(void **state)
+{
+    (void)state;
+    struct bench bench;
+    uint8_t frame[8];
+    good_frame(&bench, frame);
+    struct mlx90333 other = bench.sensor;
+    assert_true(mlx90333_equal(&bench.sensor, &other));
+#define CHANGED(field)                                                                                                 \
+    *(uint8_t *)&other.field ^= 1u;                                                                                    \
+    assert_false(mlx90333_equal(&bench.sensor, &other));                                                               \
+    assert_false(mlx90333_equal(&other, &bench.sensor));                                                               \
+    other = bench.sensor;
+    REMEMBERED(CHANGED)
+#undef CHANGED
+    other.fault = bench.sensor.fault = SIM_SENSOR_FROZEN;
+    assert_false(mlx90333_equal(&bench.sensor, &other));
+}
+
+static void what_leaves_nothing_behind_tells_no_sensors_apart(void **state)
+{
+    (void)state;
+    struct bench bench;
+    uint8_t frame[8];
+    good_frame(&bench, frame);
+    struct mlx90333 other = bench.sensor;
+    other.violations[MLX90333_BYTE_GAP]++;
+    other.random++;
+    other.latch_ns++;
+    other.awake_ns++; /* long over */
+    other.restarting = true;
+    assert_true(mlx90333_equal(&bench.sensor, &other));
+    other.awake_ns = bench.now + 1u;
+    assert_false(mlx90333_equal(&bench.sensor, &other));
+    bench.sensor.awake_ns = other.awake_ns;
+    assert_false(mlx90333_equal(&bench.sensor, &other)); /* one of the masters is to blame for a clock now */
+    bench.sensor.restarting = true;
+    assert_true(mlx90333_equal(&bench.sensor, &other));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -207,6 +281,8 @@ int main(void)
         cmocka_unit_test(an_extra_clock_slips_the_frame_by_a_bit_once),
         cmocka_unit_test(a_sensor_without_supply_lets_the_line_go_and_starts_anew),
         cmocka_unit_test(without_the_parameter_an_error_ends_in_no_reset),
+        cmocka_unit_test(sensors_that_remember_different_things_are_not_equal),
+        cmocka_unit_test(what_leaves_nothing_behind_tells_no_sensors_apart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
