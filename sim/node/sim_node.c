@@ -16,59 +16,15 @@
 /* A chip so far ahead of a tick's SYNC stands still: what comes in this tick passes it by. */
 #define STALLED_FS (20000u * DSPIC_FS_PER_NS)
 
-static unsigned sim_node_position(const struct mlx90333 *sensor)
-{
-    return sensor->byte * 8u + sensor->bit;
-}
-
-static void sim_node_begin_frame(struct sim_node *node, uint64_t now_ns)
-{
-    const struct sampler *sampler = &node->board.node.sampler;
-    node->begun = (struct sim_node_frame){.number = node->frame.number + 1u,
-                                          .begun_fs = now_ns * DSPIC_FS_PER_NS,
-                                          .slip = (uint8_t)(sim_node_position(&node->sensor) % 64u),
-                                          .followed = sampler->followed,
-                                          .alpha_before = sampler->alpha,
-                                          .beta_before = sampler->beta};
-}
-
-static void sim_node_end_frame(struct sim_node *node)
-{
-    node->frame = node->begun;
-    node->frame.line = node->line;
-    node->frame.sent = node->clean;
-}
-
-/* The master sends ones but for the MLX90316's start byte, on a pin of its own beside its input. */
-static void sim_node_clock_sensor(struct sim_node *node, bool level, uint64_t now_ns)
-{
-    const bool sent = dspic_output(node->chip, PIN_SENSOR_SEND) != DSPIC_LOW;
-    if (level && sim_node_position(&node->twin) == 0)
-        sim_node_begin_frame(node, now_ns);
-    const bool seen = mlx90333_clock(&node->sensor, now_ns, level, sent);
-    const bool clean = mlx90333_clock(&node->twin, now_ns, level, sent);
-    dspic_wire(node->chip, PIN_SENSOR_DATA, seen);
-    if (level)
-        return;
-    node->line = node->line << 1 | seen;
-    node->clean = node->clean << 1 | clean;
-}
-
-static void sim_node_select_sensor(struct sim_node *node, bool level, uint64_t now_ns)
-{
-    mlx90333_select(&node->sensor, now_ns, level);
-    mlx90333_select(&node->twin, now_ns, level);
-}
-
 static void sim_node_on_pin(void *context, unsigned rp, enum dspic_drive drive, uint64_t now_fs)
 {
     struct sim_node *node = context;
     const bool level = drive != DSPIC_LOW; /* pulled up */
     const uint64_t now_ns = now_fs / DSPIC_FS_PER_NS;
     if (rp == PIN_SENSOR_SELECT)
-        sim_node_select_sensor(node, level, now_ns);
+        sim_node_sensor_select(node, level, now_ns);
     else if (rp == PIN_SENSOR_CLOCK)
-        sim_node_clock_sensor(node, level, now_ns);
+        sim_node_sensor_clock(node, level, now_ns);
 }
 
 static uint64_t sim_node_record_of(const struct node *firmware)
@@ -89,7 +45,7 @@ static void sim_node_note_armed(struct sim_node *node)
 static void sim_node_on_start(void *context)
 {
     struct sim_node *node = context;
-    node->twin.violations[MLX90333_SELECT_HIGH] = node->releases;
+    sim_node_sensor_forget_releases(node);
     port_boot(&node->board);
     sim_node_note_armed(node);
 }
@@ -182,13 +138,13 @@ static void sim_node_on_interrupt(void *context, unsigned irq)
     const uint64_t cycle_fs = dspic_cycle_fs(node->chip);
     const uint64_t end_fs =
         dspic_now_fs(node->chip) + (CYCLES[handler].whole - node->parameters.chip.exit_cycles) * cycle_fs;
-    node->releases = node->twin.violations[MLX90333_SELECT_HIGH];
+    sim_node_sensor_note_releases(node);
     dspic_compute_until(node->chip, CYCLES[handler].acts, CYCLES[handler].address);
     sim_node_serve(node, irq);
     if (node->board.node.armed != before) {
         sim_node_note_armed(node);
         if (irq == IRQ_SPI1)
-            sim_node_end_frame(node);
+            sim_node_sensor_end_frame(node);
     }
     if (end_fs > dspic_now_fs(node->chip))
         dspic_compute(node->chip, (end_fs - dspic_now_fs(node->chip)) / cycle_fs);
@@ -232,7 +188,8 @@ sim_node *sim_node_new_as(const struct sim_node_parameters *parameters)
     node->parameters = *parameters;
     node->chip = dspic_new(&parameters->chip,
                            &(struct dspic_wiring){node, sim_node_on_pin, sim_node_on_start, sim_node_on_loop,
-                                                  sim_node_on_interrupt, sim_node_on_trap, sim_node_on_outside});
+                                                  sim_node_on_interrupt, sim_node_on_trap, sim_node_on_outside,
+                                                  sim_node_sensor_byte_begins, sim_node_sensor_byte_ends});
     node->board.chip = node->chip;
     if (node->chip) {
         sim_node_program_default(node);
@@ -269,28 +226,13 @@ void sim_node_power_on(sim_node *node)
 {
     if (node->quick.on)
         node->quick.level->leave(node);
-    mlx90333_power_on(&node->sensor, 0, &node->parameters.sensor);
-    mlx90333_power_on(&node->twin, 0, &node->parameters.sensor);
-    node->twin.parameters.resets_after_error = false;
+    sim_node_sensor_power_on(node);
     dspic_wire(node->chip, PIN_LINK_SELECT, true);
     dspic_power_on(node->chip, 0);
     node->powered = true;
     while (!node->board.loading && !node_ready(&node->board.node) && dspic_next_fs(node->chip) != UINT64_MAX)
         dspic_run_until(node->chip, dspic_next_fs(node->chip));
     node->tick_fs = dspic_now_fs(node->chip);
-}
-
-void sim_node_set_sensor_field(struct mlx90333 *sensor, uint64_t since_fs, struct sim_field field)
-{
-    const struct mlx90333_field of = {
-        .since_ns = since_fs / DSPIC_FS_PER_NS, .alpha_deg = field.alpha_deg, .beta_deg = field.beta_deg};
-    mlx90333_set_field(sensor, &of);
-}
-
-void sim_node_set_field(sim_node *node, uint64_t since_fs, struct sim_field field)
-{
-    sim_node_set_sensor_field(&node->sensor, since_fs, field);
-    sim_node_set_sensor_field(&node->twin, since_fs, field);
 }
 
 void sim_node_sync(sim_node *node, struct sim_field field)
@@ -304,8 +246,8 @@ void sim_node_sync(sim_node *node, struct sim_field field)
     node->deaf = !node->powered || sim_node_dark(node) || dspic_now_fs(node->chip) > node->tick_fs + STALLED_FS;
     if (node->deaf)
         return;
-    sim_node_set_field(node, node->tick_fs, field);
-    mlx90333_set_fault(&node->sensor, node->fault, node->argument);
+    sim_node_sensor_set_fields(node, node->tick_fs, field);
+    sim_node_sensor_fault(node, node->fault, node->argument);
     node->fault = SIM_SENSOR_GOOD;
     dspic_input(node->chip, PIN_SYNC, true, node->tick_fs);
     dspic_input(node->chip, PIN_SYNC, false, node->tick_fs);
@@ -315,13 +257,13 @@ void sim_node_sync(sim_node *node, struct sim_field field)
 void sim_node_note_select(struct sim_node_tick *came, bool low)
 {
     const enum sim_node_step from = low ? SIM_NODE_SYNCED : SIM_NODE_SELECTED;
-    const bool whole = low || (came->bits == 8u * WHISKER_RECORD_BYTES && !came->high);
+    const bool whole = low || (came->bits == LINK_BITS && !came->high);
     came->step = came->step != from || !whole ? SIM_NODE_ODD : low ? SIM_NODE_SELECTED : SIM_NODE_ENDED;
 }
 
 void sim_node_note_sck(struct sim_node_tick *came, bool level, bool mosi)
 {
-    if (came->step != SIM_NODE_SELECTED || level == came->high || (level && came->bits == 8u * WHISKER_RECORD_BYTES)) {
+    if (came->step != SIM_NODE_SELECTED || level == came->high || (level && came->bits == LINK_BITS)) {
         came->step = SIM_NODE_ODD;
         return;
     }
@@ -338,7 +280,7 @@ void sim_node_select(sim_node *node, bool low)
         return;
     sim_node_note_select(&node->came, low);
     if (low)
-        node->second = node->bits >= 8u * WHISKER_RECORD_BYTES; /* after a whole transfer, not one cut short */
+        node->second = node->bits >= LINK_BITS; /* after a whole transfer, not one cut short */
     if (!node->deaf)
         dspic_input(node->chip, PIN_LINK_SELECT, !low, node->tick_fs + AT_FS[node->second][low]);
 }
@@ -357,19 +299,49 @@ bool sim_node_sck(sim_node *node, bool level, bool mosi)
     return dspic_output(node->chip, PIN_LINK_MISO) != DSPIC_LOW;
 }
 
+static void sim_node_note_word(struct sim_node_tick *came, uint16_t sent)
+{
+    if (came->step != SIM_NODE_SELECTED || came->bits > LINK_BITS - WORD_BITS) {
+        came->step = SIM_NODE_ODD;
+        return;
+    }
+    came->order = came->order << WORD_BITS | sent;
+    came->bits = (uint8_t)(came->bits + WORD_BITS);
+}
+
+static uint16_t sim_node_word_by_edges(sim_node *node, uint16_t sent)
+{
+    uint16_t answer = 0;
+    for (unsigned i = WORD_BITS; i-- > 0;) {
+        answer = (uint16_t)(answer << 1 | sim_node_sck(node, true, sent >> i & 1u));
+        (void)sim_node_sck(node, false, sent >> i & 1u);
+    }
+    return answer;
+}
+
+static uint16_t sim_node_word(sim_node *node, uint16_t sent)
+{
+    static const struct dspic_lines LINES = {PIN_LINK_CLOCK, PIN_LINK_MOSI, PIN_LINK_MISO};
+    uint16_t word = sent;
+    const bool whole =
+        !node->deaf && !node->by_edges && dspic_input_word(node->chip, &LINES, &word, node->tick_fs + SELECT_FS);
+    if (!whole)
+        return sim_node_word_by_edges(node, sent);
+    sim_node_note_word(&node->came, sent);
+    node->bits += WORD_BITS;
+    return word;
+}
+
 uint64_t sim_node_transfer(sim_node *node, uint64_t order)
 {
     uint64_t bits = 0;
     if (node->quick.on && node->came.step == SIM_NODE_SYNCED) {
         bits = node->quick.record;
-        node->came =
-            (struct sim_node_tick){node->came.field, order, 8u * WHISKER_RECORD_BYTES, false, SIM_NODE_SELECTED};
+        node->came = (struct sim_node_tick){node->came.field, order, LINK_BITS, false, SIM_NODE_SELECTED};
     } else {
         sim_node_select(node, true);
-        for (unsigned i = 8u * WHISKER_RECORD_BYTES; i-- > 0;) {
-            bits = bits << 1 | sim_node_sck(node, true, order >> i & 1u);
-            (void)sim_node_sck(node, false, order >> i & 1u);
-        }
+        for (unsigned i = LINK_BITS; i > 0; i -= WORD_BITS)
+            bits = bits << WORD_BITS | sim_node_word(node, (uint16_t)(order >> (i - WORD_BITS)));
     }
     sim_node_select(node, false);
     return bits;
@@ -417,7 +389,7 @@ void sim_node_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argume
 uint32_t sim_node_violations(const sim_node *node)
 {
     const struct dspic_violations v = dspic_violations(node->chip);
-    return mlx90333_violations(&node->twin) + v.overclocked + v.pll_running + v.spi_settings + v.spi_disabled +
+    return sim_node_sensor_violations(node) + v.overclocked + v.pll_running + v.spi_settings + v.spi_disabled +
            v.spi_overwrite + v.pins_locked + v.unlock;
 }
 
@@ -457,23 +429,14 @@ bool sim_node_miso(const sim_node *node)
 
 void sim_node_field(sim_node *node, struct sim_field field)
 {
-    sim_node_set_field(node, sim_node_fs(node), field);
-}
-
-void sim_node_sensor_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argument)
-{
-    mlx90333_set_fault(&node->sensor, fault, argument);
+    sim_node_sensor_set_fields(node, sim_node_fs(node), field);
 }
 
 /* The chip last: it may not return from this. */
 static void sim_node_lab_supply(sim_node *node, bool on)
 {
     const uint64_t now = sim_node_fs(node);
-    struct mlx90333 *const sensors[] = {&node->sensor, &node->twin};
-    for (unsigned i = 0; i < 2u; i++) {
-        mlx90333_select(sensors[i], now / DSPIC_FS_PER_NS, true);
-        mlx90333_supply(sensors[i], now / DSPIC_FS_PER_NS, on);
-    }
+    sim_node_sensor_supply(node, on);
     memset(&node->board.node, 0xA5, sizeof node->board.node);
     node->board.trapped = 0xA5A5u;
     if (on)
@@ -506,7 +469,7 @@ void sim_node_disturb(sim_node *node, enum sim_node_disturbance what, unsigned a
         break;
     case SIM_NODE_SENSOR_OFF:
     case SIM_NODE_SENSOR_ON:
-        mlx90333_supply(&node->sensor, sim_node_fs(node) / DSPIC_FS_PER_NS, what == SIM_NODE_SENSOR_ON);
+        sim_node_sensor_switch(node, what == SIM_NODE_SENSOR_ON);
         break;
     default:
         break;

@@ -6,7 +6,7 @@
 
 #include "sim_node_state.h"
 
-enum { CHECK_TICKS = 1000, LINK_BITS = 8 * WHISKER_RECORD_BYTES };
+enum { CHECK_TICKS = 1000 };
 
 #ifdef SAMPLER_RESYNC_EVERY_FRAME /* each frame is followed by waits of the board */
 static const bool FRAMES_FOLLOW = false;
@@ -55,9 +55,8 @@ static struct sim_node_state_of_tick sim_node_record_state(const struct sim_node
 static void sim_node_record_enter(struct sim_node *node)
 {
     struct sim_node_quick *quick = &node->quick;
-    if (!sim_node_record_is_plain(&node->came) || !sim_node_record_sensor_rests(&node->sensor) ||
-        !sim_node_record_sensor_rests(&node->twin) || !sim_node_record_firmware_rests(&node->board.node) ||
-        !dspic_rests(node->chip))
+    if (!sim_node_record_is_plain(&node->came) || !sim_node_record_sensor_rests(&node->sensor) || node->apart ||
+        !sim_node_record_firmware_rests(&node->board.node) || !dspic_rests(node->chip))
         return;
     quick->on = true;
     quick->ticks = 0;
@@ -109,7 +108,6 @@ static void sim_node_record_make_up(struct sim_node *node)
     node->tick_fs -= SIM_NODE_TICK_FS;
     node->board.node.sampler = quick->before.sampler;
     sim_node_record_put_sense(&node->sensor, &quick->before.sense);
-    sim_node_record_put_sense(&node->twin, &quick->before.sense);
     node->came.step = SIM_NODE_ASLEEP;
     sim_node_record_replay(node, &quick->last);
     sim_node_run_registers(node);
@@ -198,7 +196,7 @@ static bool sim_node_record_read(struct sim_node *node)
     struct order order;
     if (node->came.step != SIM_NODE_ENDED || !sim_node_record_parse(node->came.order, &order))
         return false;
-    sim_node_set_sensor_field(&node->sensor, node->tick_fs, node->came.field);
+    sim_node_sensor_set_field(&node->sensor, node->tick_fs, node->came.field);
     const uint8_t *frame = mlx90333_read(&node->sensor, node->tick_fs / DSPIC_FS_PER_NS + quick->latch_ns);
     if (!sim_node_record_is_good(&quick->now.sampler, frame)) {
         sim_node_record_put_sense(&node->sensor, &sense);

@@ -1,5 +1,6 @@
-/* Record level against the registers: two nodes of one seed and one schedule, drawn at random, one of them allowed to
- * take plain ticks as a whole. Each bit that they send is compared. */
+/* Levels of detail against each other: two nodes of one seed and one schedule, drawn at random. One takes plain ticks
+ * as a whole, the other has its registers; or one exchanges bytes and words whole, and the other plays each edge beside
+ * the sensor's twin. Each bit that they send is compared. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +14,8 @@
 #include "sim_rng.h"
 #include "whisker_protocol.h"
 
-enum { RUNS = 12, TICKS = 3000, REGISTERS = 0, RECORDS = 1, NEVER = 1 << 30 };
+enum { RUNS = 12, TICKS = 3000, NEVER = 1 << 30 };
+enum way { EDGES, REGISTERS, RECORDS };
 
 struct pair {
     sim_node *nodes[2];
@@ -28,11 +30,13 @@ static unsigned draw(struct pair *pair, unsigned bound)
 }
 
 /* Every other seed has a sensor with a filter, every fourth one converts in its own time, with noise. */
-static struct pair pair_of(uint64_t seed)
+static struct pair pair_of(uint64_t seed, enum way first, enum way second)
 {
+    const enum way ways[] = {first, second};
     struct pair pair = {.random = seed};
     struct sim_node_parameters parameters;
     sim_node_parameters_default(&parameters, seed);
+    parameters.sensor.resets_after_error = seed % 3 == 2;
     parameters.sensor.filter = seed % 2;
     if (seed % 4 == 1) {
         parameters.sensor.conversion_ns = 200000;
@@ -40,7 +44,9 @@ static struct pair pair_of(uint64_t seed)
     }
     for (unsigned i = 0; i < 2; i++) {
         pair.nodes[i] = sim_node_new_as(&parameters);
-        sim_node_by_records(pair.nodes[i], i == RECORDS);
+        sim_node_by_records(pair.nodes[i], ways[i] == RECORDS);
+        if (ways[i] == EDGES)
+            sim_node_by_edges(pair.nodes[i]);
         sim_node_power_on(pair.nodes[i]);
     }
     return pair;
@@ -48,12 +54,18 @@ static struct pair pair_of(uint64_t seed)
 
 static void assert_same(const struct pair *pair)
 {
-    assert_int_equal(sim_node_version(pair->nodes[REGISTERS]), sim_node_version(pair->nodes[RECORDS]));
-    assert_int_equal(sim_node_violations(pair->nodes[REGISTERS]), sim_node_violations(pair->nodes[RECORDS]));
+    sim_node *a = pair->nodes[0], *b = pair->nodes[1];
+    assert_int_equal(sim_node_version(a), sim_node_version(b));
+    assert_int_equal(sim_node_violations(a), sim_node_violations(b));
     for (unsigned counter = 0; counter < WHISKER_HEALTH_COUNT; counter++)
-        assert_int_equal(sim_node_counted(pair->nodes[REGISTERS], counter),
-                         sim_node_counted(pair->nodes[RECORDS], counter));
-    assert_false(sim_node_differs(pair->nodes[RECORDS]));
+        assert_int_equal(sim_node_counted(a, counter), sim_node_counted(b, counter));
+    assert_false(sim_node_differs(a) || sim_node_differs(b));
+}
+
+static void free_pair(struct pair *pair)
+{
+    sim_node_free(pair->nodes[0]);
+    sim_node_free(pair->nodes[1]);
 }
 
 /* The first bits of a window, each answer compared. */
@@ -62,8 +74,8 @@ static void clock_bits(struct pair *pair, const uint8_t *order, unsigned bits)
     for (unsigned i = 0; i < bits; i++) {
         const bool mosi = i / 8 < WHISKER_SERVICE_BYTES && ((unsigned)order[i / 8] >> (7 - i % 8) & 1u);
         for (unsigned level = 2; level-- > 0;) {
-            const bool sent = sim_node_sck(pair->nodes[REGISTERS], level, mosi);
-            assert_int_equal(sent, sim_node_sck(pair->nodes[RECORDS], level, mosi));
+            const bool sent = sim_node_sck(pair->nodes[0], level, mosi);
+            assert_int_equal(sent, sim_node_sck(pair->nodes[1], level, mosi));
         }
     }
 }
@@ -86,7 +98,7 @@ static void whole_window(struct pair *pair, const uint8_t *order)
     uint64_t bits = 0;
     for (unsigned i = 0; i < WHISKER_ORDER_BYTES; i++)
         bits = bits << 8 | order[i];
-    assert_int_equal(sim_node_transfer(pair->nodes[REGISTERS], bits), sim_node_transfer(pair->nodes[RECORDS], bits));
+    assert_int_equal(sim_node_transfer(pair->nodes[0], bits), sim_node_transfer(pair->nodes[1], bits));
 }
 
 static void second_window(struct pair *pair, uint8_t tick)
@@ -131,9 +143,8 @@ static void wander(struct pair *pair, double *angle, bool jumps)
 
 static void spoil(struct pair *pair)
 {
-    static const enum sim_sensor_fault KINDS[] = {SIM_SENSOR_FLIP_BIT,   SIM_SENSOR_DEAD,       SIM_SENSOR_STUCK_LOW,
-                                                  SIM_SENSOR_ERROR_BITS, SIM_SENSOR_LOST_CLOCK, SIM_SENSOR_EXTRA_CLOCK};
-    const enum sim_sensor_fault kind = KINDS[draw(pair, sizeof KINDS / sizeof *KINDS)];
+    const enum sim_sensor_fault kind =
+        (enum sim_sensor_fault)(SIM_SENSOR_GOOD + 1 + draw(pair, SIM_SENSOR_EXTRA_CLOCK));
     const unsigned argument = draw(pair, 64);
     for (unsigned i = 0; i < 2; i++)
         sim_node_fault(pair->nodes[i], kind, argument);
@@ -184,20 +195,30 @@ static void drawn_tick(struct pair *pair, unsigned rarely)
     pair->tick++;
 }
 
-static void test_random_schedules_bring_the_same_bits(void **state)
+static void run_random_schedules(enum way first, enum way second)
 {
     static const unsigned RARELY[] = {3, 10, 50, 200};
-    (void)state;
     for (uint64_t seed = 0; seed < RUNS; seed++) {
-        struct pair pair = pair_of(seed);
+        struct pair pair = pair_of(seed, first, second);
         while (pair.tick < TICKS) {
             drawn_tick(&pair, RARELY[seed % 4]);
             assert_same(&pair);
         }
         assert_true(pair.quick > TICKS / 2);
-        sim_node_free(pair.nodes[REGISTERS]);
-        sim_node_free(pair.nodes[RECORDS]);
+        free_pair(&pair);
     }
+}
+
+static void test_random_schedules_bring_the_same_bits_at_record_level(void **state)
+{
+    (void)state;
+    run_random_schedules(REGISTERS, RECORDS);
+}
+
+static void test_random_schedules_bring_the_same_bits_edge_by_edge(void **state)
+{
+    (void)state;
+    run_random_schedules(EDGES, REGISTERS);
 }
 
 /* A node that is brought back to its registers stands where the other one does. */
@@ -205,13 +226,12 @@ static void test_after_ticks_at_record_level_the_chip_is_the_same(void **state)
 {
     (void)state;
     for (unsigned ticks = 1; ticks < 60; ticks++) {
-        struct pair pair = pair_of(ticks);
+        struct pair pair = pair_of(ticks, EDGES, RECORDS);
         while (pair.tick < ticks)
             drawn_tick(&pair, NEVER);
-        sim_node_by_records(pair.nodes[RECORDS], false);
-        const struct sim_node_report a = sim_node_report(pair.nodes[REGISTERS]),
-                                     b = sim_node_report(pair.nodes[RECORDS]);
-        assert_int_equal(sim_node_fs(pair.nodes[REGISTERS]), sim_node_fs(pair.nodes[RECORDS]));
+        sim_node_by_records(pair.nodes[1], false);
+        const struct sim_node_report a = sim_node_report(pair.nodes[0]), b = sim_node_report(pair.nodes[1]);
+        assert_int_equal(sim_node_fs(pair.nodes[0]), sim_node_fs(pair.nodes[1]));
         assert_int_equal(a.record, b.record);
         assert_int_equal(a.armed_fs, b.armed_fs);
         assert_int_equal(a.latch_fs, b.latch_fs);
@@ -220,8 +240,7 @@ static void test_after_ticks_at_record_level_the_chip_is_the_same(void **state)
         assert_int_equal(a.frame.begun_fs, b.frame.begun_fs);
         assert_int_equal(a.frame.alpha_before, b.frame.alpha_before);
         assert_same(&pair);
-        sim_node_free(pair.nodes[REGISTERS]);
-        sim_node_free(pair.nodes[RECORDS]);
+        free_pair(&pair);
     }
 }
 
@@ -230,7 +249,7 @@ static void test_one_tick_in_a_thousand_is_checked(void **state)
 {
     enum { THOUSANDS = 4 };
     uint64_t before[2], interrupts[2];
-    struct pair pair = pair_of(2);
+    struct pair pair = pair_of(2, REGISTERS, RECORDS);
     (void)state;
     while (pair.tick < 20)
         drawn_tick(&pair, NEVER);
@@ -240,17 +259,17 @@ static void test_one_tick_in_a_thousand_is_checked(void **state)
         drawn_tick(&pair, NEVER);
     for (unsigned i = 0; i < 2; i++)
         interrupts[i] = sim_node_report(pair.nodes[i]).interrupts - before[i];
-    const uint64_t per_tick = interrupts[REGISTERS] / (1000 * THOUSANDS);
-    assert_true(interrupts[RECORDS] >= 2 * THOUSANDS * per_tick);
-    assert_true(interrupts[RECORDS] < 4 * THOUSANDS * per_tick);
-    sim_node_free(pair.nodes[REGISTERS]);
-    sim_node_free(pair.nodes[RECORDS]);
+    const uint64_t per_tick = interrupts[0] / (1000 * THOUSANDS);
+    assert_true(interrupts[1] >= 2 * THOUSANDS * per_tick);
+    assert_true(interrupts[1] < 4 * THOUSANDS * per_tick);
+    free_pair(&pair);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random_schedules_bring_the_same_bits),
+        cmocka_unit_test(test_random_schedules_bring_the_same_bits_at_record_level),
+        cmocka_unit_test(test_random_schedules_bring_the_same_bits_edge_by_edge),
         cmocka_unit_test(test_one_tick_in_a_thousand_is_checked),
         cmocka_unit_test(test_after_ticks_at_record_level_the_chip_is_the_same),
     };
