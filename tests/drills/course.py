@@ -14,14 +14,14 @@ from .gaps import GAPS, Count, Gap, slipped
 from .machine import Machine, Plan
 from .witness import KEPT_S, TICKS_PER_S, Witness
 
-LOOK_S = 0.1
 PAUSE_S = (1.0, 4.0)
 STOP_S = 0.5  # within which wheels without a commander stand
 ANSWER_S = 10.0  # within which every process answers again
 FOUND_S = 60.0  # within which the estimate is near the truth again
 PATIENCE_S, LONG_S = 75.0, 600.0
 READY_S = 90.0
-SETTLE_S = 2.5  # for healths of once a second to come
+HEALTHS = 2  # messages of each process that counts: the second covers a second that began after the recovery
+COUNTING = ("pilot", "navigator")
 UNDER_WAY_S = 0.3  # what comes so soon after a fault may have been sent before it
 MOVING_M = 0.01  # in 0.3 s
 
@@ -76,7 +76,7 @@ class Course:
         with machine.running(), Link("drill", connect=machine.endpoints()) as link:
             witness = Witness(machine, link, len(make_robot().whiskers))
             try:
-                self._wait(lambda: not witness.silent(), READY_S, machine)
+                self._wait(lambda: not witness.silent(), READY_S, machine, witness)
                 began = time.monotonic()
                 while not self._over(machine, witness):
                     for fault in self._random.sample(self._faults, len(self._faults)):
@@ -101,26 +101,25 @@ class Course:
         left_s = self._plan.seconds - witness.truth.tick / TICKS_PER_S
         return machine.over or left_s < ANSWER_S
 
-    def _wait(self, wanted, patience_s: float, machine: Machine) -> bool:
+    def _wait(self, wanted, patience_s: float, machine: Machine, witness: Witness) -> bool:
         """False: it did not come to be."""
-        until = time.monotonic() + patience_s
-        while not wanted():
-            if time.monotonic() > until or machine.over:
-                return False
-            time.sleep(LOOK_S)
-        return True
+        return witness.await_true(lambda: wanted() or machine.over, patience_s) and wanted()
+
+    def _pass(self, seconds: float, machine: Machine, witness: Witness) -> None:
+        """Lets a drawn time pass, or what is left of the run."""
+        witness.await_true(lambda: machine.over, seconds)
 
     def _drill(self, fault: Fault, machine: Machine, witness: Witness) -> Event:
         truth, asked = witness.truth, time.monotonic()
         ready = self._find and self._wait(
-            lambda: witness.found_again(max(asked, time.monotonic() - 6)), READY_S, machine
+            lambda: witness.found_again(max(asked, time.monotonic() - 6)), READY_S, machine, witness
         )
-        time.sleep(self._random.uniform(*PAUSE_S))
-        moving = self._wait(lambda: truth.moved_m(0.3) > MOVING_M, 10.0, machine)
+        self._pass(self._random.uniform(*PAUSE_S), machine, witness)
+        moving = self._wait(lambda: truth.moved_m(0.3) > MOVING_M, 10.0, machine, witness)
         before, begun = Count.take(machine, witness), time.monotonic()
         moving &= truth.moved_m(0.3) > MOVING_M
         fault.begin(machine)
-        time.sleep(self._random.uniform(*fault.lasts))
+        self._pass(self._random.uniform(*fault.lasts), machine, witness)
         fault.end(machine)
         ended = time.monotonic()
         event = Event(
@@ -136,17 +135,24 @@ class Course:
 
     def _recover(self, event: Event, machine: Machine, witness: Witness) -> None:
         since = event.ended + UNDER_WAY_S
-        if self._wait(lambda: not witness.silent(since), PATIENCE_S, machine):
+        if self._wait(lambda: not witness.silent(since), PATIENCE_S, machine, witness):
             event.answered_s = max(times[bisect_left(times, since)] for times in witness.heard().values()) - event.ended
         else:
             event.silent = witness.silent(since)
-        time.sleep(SETTLE_S)
+        self._await_counts(machine, witness)
         if event.ready:
-            truth, late_s = witness.truth, FOUND_S + KEPT_S + SETTLE_S
+            truth, late_s = witness.truth, FOUND_S + 2 * KEPT_S
             known = lambda: witness.found_again(event.ended) is not None  # noqa: E731
-            self._wait(lambda: known() or truth.simulated_s(event.ended, time.monotonic()) > late_s, LONG_S, machine)
+            late = lambda: truth.simulated_s(event.ended, time.monotonic()) > late_s  # noqa: E731
+            self._wait(lambda: known() or late(), LONG_S, machine, witness)
             found = witness.found_again(event.ended)
             event.found_s = None if found is None else witness.truth.simulated_s(event.ended, found)
+
+    def _await_counts(self, machine: Machine, witness: Witness) -> None:
+        """Until what the robot's processes count has come with their health."""
+        reported = witness.messages.reported
+        wanted = {name: reported[name] + HEALTHS for name in COUNTING}
+        self._wait(lambda: all(reported[name] >= n for name, n in wanted.items()), PATIENCE_S, machine, witness)
 
     def _fill_stops(self, events: list[Event], machine: Machine) -> None:
         """From the emulator's own list of what its wheels were ordered."""

@@ -9,6 +9,7 @@ import argparse
 import json
 import os
 import random
+import select
 import shutil
 import signal
 import subprocess
@@ -153,6 +154,16 @@ class Robot:
     def runs(self) -> bool:
         return self.process.poll() is None
 
+    def ends(self, within_s: float) -> bool:
+        """Whether the supervisor has ended, or does within so long."""
+        if not self.runs:
+            return True
+        supervisor = os.pidfd_open(self.process.pid)
+        try:
+            return bool(select.select([supervisor], [], [], within_s)[0])
+        finally:
+            os.close(supervisor)
+
     def await_motion(self, patience_s: float) -> bool:
         """Until all are there and the wheels turn, both for STEADY_S but for pauses; False: they are not."""
         until, since, pids = time.monotonic() + patience_s, time.monotonic(), {}
@@ -162,7 +173,7 @@ class Robot:
                 since, pids = time.monotonic(), now
             if time.monotonic() - since >= STEADY_S and self.wheels.turn:
                 return True
-            time.sleep(10 * LOOK_S)
+            self.ends(10 * LOOK_S)
         return False
 
     def await_gone(self, patience_s: float) -> int:
@@ -265,7 +276,7 @@ class Campaign:
                 if time.monotonic() > until_s:
                     break
                 robot = self._moving(robot)
-                time.sleep(random.uniform(*PAUSE_S))
+                robot.ends(random.uniform(*PAUSE_S))
                 await_true(lambda r=robot: r.wheels.turn, BACK_S)
                 trial = attempt(number, trials[number], robot)
                 self._keep(trial)

@@ -35,8 +35,9 @@ GAP_MOST_S = 200e-6
 BATCH = 200  # pairs at the stop code in one process
 UP_S = 60.0  # for a command to have its handlers
 LATER_MOST_S = 0.3  # a pair comes so long after them at most
+LOOK_S = 0.002  # between two looks at a command's handlers
 HUNG_S = 20.0  # a process that lives so long after its pair hangs
-BLOCK = 40
+BLOCK, BLOCK_S = 40, 0.02  # ticks, and how long they take
 SEED = 3
 SHARED = "stop code"
 
@@ -97,7 +98,7 @@ def feed(made: Surroundings):
 
 
 def _feed(ring: str) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM])
     with Writer(ring, 4096) as writer:
         frames = np.zeros(BLOCK, FRAME)
         frames["lane_mask"] = 1
@@ -105,7 +106,9 @@ def _feed(ring: str) -> None:
             frames["tick"] = np.arange(number * BLOCK, (number + 1) * BLOCK)
             frames["sequence"], frames["time_cycles"] = frames["tick"], frames["tick"] * 30000
             writer.publish(frames)
-            time.sleep(0.02)
+            if signal.sigtimedwait([signal.SIGTERM], BLOCK_S):
+                break
+    os._exit(0)
 
 
 def begin(words: list, output: Path) -> int:
@@ -126,14 +129,20 @@ def begin(words: list, output: Path) -> int:
 
 def await_end(pid: int, since: float) -> int | None:
     """The exit code, negative for a signal; None: it hung, and was killed."""
-    while time.monotonic() - since < HUNG_S:
-        ended, status = os.waitpid(pid, os.WNOHANG)
-        if ended:
-            return os.waitstatus_to_exitcode(status)
-        time.sleep(0.002)
+    if ends(pid, since + HUNG_S - time.monotonic()):
+        return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     os.kill(pid, signal.SIGKILL)
     os.waitpid(pid, 0)
     return None
+
+
+def ends(pid: int, within_s: float) -> bool:
+    """Whether this child ends, and is not yet waited for, within so long."""
+    process = os.pidfd_open(pid)
+    try:
+        return bool(select.select([process], [], [], max(0.0, within_s))[0])
+    finally:
+        os.close(process)
 
 
 def handles(pid: int) -> bool:
@@ -160,9 +169,8 @@ def at_command(name: str, words: list, made: Surroundings, rng: random.Random) -
     pid = begin([name, *words], made.folder / "output")
     up_by = time.monotonic() + UP_S
     while not handles(pid):
-        assert time.monotonic() < up_by, (made.folder / "output").read_text()
-        time.sleep(0.002)
-    time.sleep(later_s)
+        assert time.monotonic() < up_by and not ends(pid, LOOK_S), (made.folder / "output").read_text()
+    assert not ends(pid, later_s), (made.folder / "output").read_text()
     send_pair(pid, pair, gap_s)
     code = await_end(pid, time.monotonic())
     result = {"what": name, "pairs": 1, "hung": int(code is None), "code": code}

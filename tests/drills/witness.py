@@ -8,7 +8,9 @@ import math
 import socket
 import threading
 import time
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
+from collections import Counter
+from collections.abc import Callable
 
 import numpy as np
 
@@ -28,23 +30,32 @@ KEPT_S = 3.0  # so long an estimate must stay near to count as found again
 ABSENT = CODES["absent"]
 
 
+class Round:
+    """What the threads share: `stop` ends them, `news` is notified after each look."""
+
+    def __init__(self):
+        self.stop, self.news = threading.Event(), threading.Condition()
+
+
 class Watch(threading.Thread):
     """Calls `look` until the end."""
 
-    def __init__(self, stop: threading.Event):
+    def __init__(self, shared: Round):
         super().__init__(daemon=True)
-        self.stop = stop
+        self.stop, self._news = shared.stop, shared.news
 
     def run(self) -> None:
         while not self.stop.is_set():
             self.look()
+            with self._news:
+                self._news.notify_all()
 
 
 class Truth(Watch):
     """True poses: `times` and `poses` (x, y, theta), `ticks` of the world."""
 
-    def __init__(self, path, stop):
-        super().__init__(stop)
+    def __init__(self, path, shared: Round):
+        super().__init__(shared)
         self._path, self._socket = path, None
         self.times, self.poses, self.ticks = [], [], []
 
@@ -99,8 +110,8 @@ class Truth(Watch):
 class Frames(Watch):
     """Frames that a reader of the ring gets: how many, and how many records of each lane were marked bad."""
 
-    def __init__(self, ring: str, lanes: int, stop):
-        super().__init__(stop)
+    def __init__(self, ring: str, lanes: int, shared: Round):
+        super().__init__(shared)
         self._ring, self._lanes, self._reader = ring, lanes, None
         self.count, self.times, self.bad, self.overruns = 0, [], np.zeros(lanes, int), 0
 
@@ -131,10 +142,11 @@ class Frames(Watch):
 class Messages(Watch):
     """Rows and answers as pilot and navigator send them, past the relays; their health as they report it."""
 
-    def __init__(self, link: Link, truth: Truth, stop):
-        super().__init__(stop)
+    def __init__(self, link: Link, truth: Truth, shared: Round):
+        super().__init__(shared)
         self._inbox, self._truth = link.subscribe("observation", "localisation", "health/*"), truth
         self.rows, self.answers, self.health = [], [], {}  # (time, received), (time, received, error in m)
+        self.reported = Counter()  # messages of health, by process
 
     def look(self) -> None:
         for received in self._inbox.take(ASK_S):
@@ -147,6 +159,7 @@ class Messages(Watch):
                 self.answers.append((now, received, self._error(received.message, now)))
             else:
                 self.health[received.message.process] = (now, received.message)
+                self.reported[received.message.process] += 1
 
     def _error(self, answer, now: float) -> float:
         x, y = self._truth.at(now) or (math.inf, math.inf)
@@ -157,8 +170,8 @@ class Messages(Watch):
 class Page(Watch):
     """Times at which the view answered a browser."""
 
-    def __init__(self, port: int, stop):
-        super().__init__(stop)
+    def __init__(self, port: int, shared: Round):
+        super().__init__(shared)
         self._port, self.times = port, []
 
     def look(self) -> None:
@@ -177,8 +190,8 @@ class Page(Watch):
 class Files(Watch):
     """Times since which a bag was seen to grow, and whisker-base to take frames."""
 
-    def __init__(self, machine: Machine, stop):
-        super().__init__(stop)
+    def __init__(self, machine: Machine, shared: Round):
+        super().__init__(shared)
         self._machine = machine
         self._bytes = self._frames = -1
         self._looked = 0.0
@@ -199,19 +212,30 @@ class Witness:
     """All of these together."""
 
     def __init__(self, machine: Machine, link: Link, lanes: int):
-        self._stop = threading.Event()
-        self.truth = Truth(machine.simulation, self._stop)
-        self.frames = Frames(machine.ring, lanes, self._stop)
-        self.messages = Messages(link, self.truth, self._stop)
-        self.page, self.files = Page(machine.view_port, self._stop), Files(machine, self._stop)
+        self._round = Round()
+        self.truth = Truth(machine.simulation, self._round)
+        self.frames = Frames(machine.ring, lanes, self._round)
+        self.messages = Messages(link, self.truth, self._round)
+        self.page, self.files = Page(machine.view_port, self._round), Files(machine, self._round)
         self._all = [self.truth, self.frames, self.messages, self.page, self.files]
         for watch in self._all:
             watch.start()
 
     def end(self) -> None:
-        self._stop.set()
+        self._round.stop.set()
         for watch in self._all:
             watch.join()
+
+    def await_true(self, wanted: Callable[[], bool], patience_s: float) -> bool:
+        """Until it is so, looked at again when there is news; False: it did not come to be."""
+        until = time.monotonic() + patience_s
+        while not wanted():
+            left = until - time.monotonic()
+            if left <= 0.0:
+                return False
+            with self._round.news:
+                self._round.news.wait(left)
+        return True
 
     def heard(self) -> dict[str, list]:
         """By process: the times at which it was seen to do its work."""
@@ -234,7 +258,8 @@ class Witness:
         """When the estimate had come near for KEPT_S, counted from then; None: not yet. `since` itself: it never left."""
         begun = since
         last = since
-        for when, _, error in [entry for entry in self.messages.answers if entry[0] >= since]:
+        answers = self.messages.answers
+        for when, _, error in answers[bisect_left(answers, since, key=lambda entry: entry[0]) :]:
             if error > NEAR_M or when - last > 1.0:
                 begun = when if error <= NEAR_M else math.inf
             elif math.isinf(begun):

@@ -24,7 +24,6 @@ PROBE = Path(__file__).with_name("kernel_ring_probe")
 NOBODY = 65534
 ASLEEP = Path("/run/asleep")
 WHEELS_M_S = 0.1
-ORDER_S = 0.1  # an order lasts 0.3 s
 STILL_M = 0.002  # what a base may still report when it stands
 MOTION_M = 0.05
 
@@ -294,7 +293,6 @@ def drive(port: str, then: Callable[[], object]) -> object:
         def on() -> bool:
             nonlocal way
             say(f"drive {WHEELS_M_S} 0")
-            time.sleep(ORDER_S)
             way += travelled(say)
             return way > MOTION_M
 
