@@ -11,49 +11,44 @@ static const double PASSED = 0.95;                     /* probability that a whi
 static const double GONE = 3.0, GONE_SHARE = 0.5;      /* passages that remove a face, beside so many of its contacts */
 static const double HITS_MOST = 20.0;                  /* contacts that count against passages */
 static const double THROUGH = 0.5;                     /* a row in which the body stands in a face, without it */
-static const double AWAY_M = 1.0, GROWN_M = 0.01;      /* a way without a face, how uncertain it is then: a closure */
-static const double CONFIRMED = 5.0, DOUBT = 0.01;     /* contacts that confirm it; least doubt of each */
 static const double CORNER_M = 0.03, PLACE_MOST = 0.3; /* m from a face's end; m of the pose: no passage is counted */
 
 void nav_faces_begin(struct nav_faces *f)
 {
     f->row = 0;
     f->way = 0.0;
-    f->noted = -1;
+    f->made = 0;
+    f->corners.count = 0;
     f->count = 0;
     f->loose = 0;
     f->right = 1.0;
     f->refused = 1.0;
 }
 
-void nav_faces_feel(struct nav_faces *f, struct nav_face *g, struct nav_touch point, double known, double probability,
-                    double contacts)
+void nav_faces_meet(struct nav_faces *f, const struct nav_face *g, const struct nav_joint *j)
 {
-    struct nav_sighting now = {f->row, f->way, point.x, point.y};
-    double doubt = fmax(1.0 - probability, DOUBT);
-    if (f->way - g->seen.way > AWAY_M) {
-        g->waits = known > GROWN_M ? CONFIRMED : 0.0;
-        g->open = (struct nav_closure){now, g->seen, 0.0};
+    for (int n = 0; n < f->count; n++) {
+        if (&f->face[n] != g)
+            nav_corners_feel(&f->corners, g, &f->face[n], j);
     }
-    g->seen = now;
-    if (!(g->waits > 0.0))
-        return;
-    g->open.probability = 1.0 - (1.0 - g->open.probability) * doubt;
-    g->waits -= contacts;
-    if (g->waits > 0.0)
-        return;
-    f->closure = g->open;
-    f->noted = f->row;
 }
 
-static double faces_fresh(const struct nav_contact *c)
+void nav_faces_feel(struct nav_faces *f, struct nav_face *g, const struct nav_joint *j, const struct nav_feel *feel)
+{
+    struct nav_sighting now = {f->row, f->way, feel->x, feel->y};
+    nav_stretch_feel(&g->stretch, now, feel->known, feel->probability, feel->contacts);
+    g->felt_at = feel->along;
+    nav_faces_meet(f, g, j);
+}
+
+double nav_faces_fresh(const struct nav_contact *c)
 {
     return (NEW_SHARE + c->ghost) / c->length;
 }
 
 /* The face that a contact is most likely of; -1: none known to `sharp` m explains it. *total: its likelihood, 1 / m. */
 static int faces_choose(const struct nav_faces *f, const struct nav_joint *j, const struct nav_touch *t, double sigma,
-                        double fresh, double sharp, double *total, double *most)
+                        double fresh, double sharp, double *total)
 {
     struct nav_face_view view;
     double best = 0.0, all = 0.0;
@@ -69,7 +64,6 @@ static int faces_choose(const struct nav_faces *f, const struct nav_joint *j, co
         }
     }
     *total = all + fresh;
-    *most = best;
     return all > CLEAR * fresh ? chosen : -1;
 }
 
@@ -88,28 +82,30 @@ static void faces_apply_normal(struct nav_face *g, struct nav_joint *j, const st
 }
 
 static void faces_apply(struct nav_faces *f, struct nav_face *g, struct nav_joint *j, const struct nav_touch *t,
-                        double sigma, double probability)
+                        double sigma, double total)
 {
     struct nav_face_view view;
     if (!nav_face_look(g, j, t, &view))
         return;
-    nav_faces_feel(f, g, *t, sqrt(fmax(view.variance, 0.0)), probability, 1.0);
-    nav_joint_measure(j, &view.form, -view.off, nav_face_noise(&view, sigma));
+    double known = sqrt(fmax(view.variance, 0.0)), noise = nav_face_noise(&view, sigma);
+    double probability = nav_face_likelihood(g, &view, noise) / total;
+    nav_joint_measure(j, &view.form, -view.off, noise);
     faces_apply_normal(g, j, t);
     nav_face_feel(g, view.along, view.along);
     g->hits += 1.0;
     g->missed = fmax(g->missed - 1.0, 0.0);
+    nav_faces_feel(f, g, j, &(struct nav_feel){t->x, t->y, view.along, known, probability, 1.0});
 }
 
 double nav_faces_take(struct nav_faces *f, struct nav_joint *j, const struct nav_touches *touches,
                       const struct nav_contact *contact)
 {
     const struct nav_touch *t = &touches->touch[contact->place];
-    double total, most;
+    double total;
     f->loose &= ~(1ULL << contact->place);
-    int chosen = faces_choose(f, j, t, contact->sigma, faces_fresh(contact), SHARP_M, &total, &most);
+    int chosen = faces_choose(f, j, t, contact->sigma, nav_faces_fresh(contact), SHARP_M, &total);
     if (chosen >= 0) {
-        faces_apply(f, &f->face[chosen], j, t, contact->sigma, most / total);
+        faces_apply(f, &f->face[chosen], j, t, contact->sigma, total);
         return log(total * contact->length);
     }
     f->loose |= 1ULL << contact->place;
@@ -143,12 +139,12 @@ double nav_faces_miss(struct nav_faces *f, struct nav_joint *j, const struct nav
 double nav_faces_apart(const struct nav_faces *f, const struct nav_joint *j, const struct nav_touches *touches,
                        uint64_t among, const struct nav_contact *contact)
 {
-    double fresh = faces_fresh(contact), total, most, sum = 0.0;
+    double fresh = nav_faces_fresh(contact), total, sum = 0.0;
     for (int place = 0; place < NAV_TOUCHES_MOST; place++) {
         if (!(among >> place & 1))
             continue;
         const struct nav_touch *t = &touches->touch[place];
-        (void)faces_choose(f, j, t, sqrt(t->variance), fresh, INFINITY, &total, &most);
+        (void)faces_choose(f, j, t, sqrt(t->variance), fresh, INFINITY, &total);
         sum += log(fmax((total - fresh) * contact->length / NAV_FACES_LOOSE, 1.0));
     }
     return sum;
@@ -157,17 +153,16 @@ double nav_faces_apart(const struct nav_faces *f, const struct nav_joint *j, con
 double nav_faces_drain(struct nav_faces *f, struct nav_joint *j, const struct nav_touches *touches, uint64_t among,
                        const struct nav_contact *contact, bool all)
 {
-    double total, most, sum = 0.0;
+    double total, sum = 0.0;
     for (int place = 0; place < NAV_TOUCHES_MOST; place++) {
         const struct nav_touch *t = &touches->touch[place];
         if (!(f->loose & among & touches->held & 1ULL << place))
             continue;
         double sigma = sqrt(t->variance);
-        int chosen =
-            faces_choose(f, j, t, sigma, faces_fresh(contact), all ? (double)INFINITY : SHARP_M, &total, &most);
+        int chosen = faces_choose(f, j, t, sigma, nav_faces_fresh(contact), all ? (double)INFINITY : SHARP_M, &total);
         if (chosen < 0)
             continue;
-        faces_apply(f, &f->face[chosen], j, t, sigma, most / total);
+        faces_apply(f, &f->face[chosen], j, t, sigma, total);
         f->loose &= ~(1ULL << place);
         sum += log(total * contact->length / NAV_FACES_LOOSE);
     }

@@ -56,6 +56,12 @@ static double floor_ratio(const struct nav_floor *f, const float *tile, const fl
     return sum / total;
 }
 
+/* Probability that a tip is beyond a border, so many standard deviations from it. */
+static double floor_beyond(double z)
+{
+    return 0.5 * erfc(z / sqrt(2.0));
+}
+
 static void floor_learn(const struct nav_floor *f, float *tile, double share, const float *ratio)
 {
     for (int k = 0; tile && k < f->classes; k++)
@@ -82,33 +88,60 @@ struct floor_view {
     struct nav_linear form; /* of `off` */
 };
 
+/* A tip's place in the lattice. */
+struct floor_place {
+    double nx, ny, lx, ly; /* the lattice's first axis; the tip from the robot's centre, along the world's axes */
+    double at[2];          /* m from the reference, along both axes */
+    double tile[2];        /* tiles from the lines through tile (0, 0) */
+};
+
+static struct floor_place floor_place(const struct nav_floor *f, const double *m, double x, double y)
+{
+    double c = cos(m[NAV_JOINT_HEADING]), s = sin(m[NAV_JOINT_HEADING]);
+    struct floor_place p = {.lx = c * x - s * y, .ly = s * x + c * y};
+    p.nx = cos(m[NAV_JOINT_LATTICE_TURN]);
+    p.ny = sin(m[NAV_JOINT_LATTICE_TURN]);
+    double dx = m[NAV_JOINT_X] + p.lx - f->x, dy = m[NAV_JOINT_Y] + p.ly - f->y;
+    p.at[0] = p.nx * dx + p.ny * dy;
+    p.at[1] = p.nx * dy - p.ny * dx;
+    p.tile[0] = (p.at[0] - m[NAV_JOINT_LATTICE_U]) / m[NAV_JOINT_PITCH];
+    p.tile[1] = (p.at[1] - m[NAV_JOINT_LATTICE_V]) / m[NAV_JOINT_PITCH];
+    return p;
+}
+
+/* m from a line of the lattice along an axis, times `sign`. */
+static struct nav_linear floor_form(const struct floor_place *p, int axis, double line, double sign)
+{
+    struct nav_linear form = {.terms = 0};
+    double ax = axis ? -p->ny : p->nx, ay = axis ? p->nx : p->ny;
+    nav_linear_add(&form, NAV_JOINT_X, sign * ax);
+    nav_linear_add(&form, NAV_JOINT_Y, sign * ay);
+    nav_linear_add(&form, NAV_JOINT_HEADING, sign * (ay * p->lx - ax * p->ly));
+    nav_linear_add(&form, NAV_JOINT_LATTICE_TURN, sign * (axis ? -p->at[0] : p->at[1]));
+    nav_linear_add(&form, axis ? NAV_JOINT_LATTICE_V : NAV_JOINT_LATTICE_U, -sign);
+    nav_linear_add(&form, NAV_JOINT_PITCH, -sign * line);
+    return form;
+}
+
 static void floor_look(const struct nav_floor *f, const struct nav_joint *j, double x, double y, struct floor_view *v)
 {
-    const double *m = j->mean;
-    double c = cos(m[NAV_JOINT_HEADING]), s = sin(m[NAV_JOINT_HEADING]), lx = c * x - s * y, ly = s * x + c * y;
-    double nx = cos(m[NAV_JOINT_LATTICE_TURN]), ny = sin(m[NAV_JOINT_LATTICE_TURN]), pitch = m[NAV_JOINT_PITCH];
-    double dx = m[NAV_JOINT_X] + lx - f->x, dy = m[NAV_JOINT_Y] + ly - f->y;
-    double at[2] = {nx * dx + ny * dy, nx * dy - ny * dx};
-    double u = (at[0] - m[NAV_JOINT_LATTICE_U]) / pitch, w = (at[1] - m[NAV_JOINT_LATTICE_V]) / pitch;
-    double line_u = round(u), line_w = round(w), off_u = (u - line_u) * pitch, off_w = (w - line_w) * pitch;
-    bool first = fabs(off_u) < fabs(off_w);
-    double off = first ? off_u : off_w, sign = off < 0.0 ? -1.0 : 1.0;
-    double ax = first ? nx : -ny, ay = first ? ny : nx;
-    *v = (struct floor_view){.column = (int)floor(u), .row = (int)floor(w), .off = fabs(off)};
-    v->across_column = first ? v->column - (int)sign : v->column;
-    v->across_row = first ? v->row : v->row - (int)sign;
-    nav_linear_add(&v->form, NAV_JOINT_X, sign * ax);
-    nav_linear_add(&v->form, NAV_JOINT_Y, sign * ay);
-    nav_linear_add(&v->form, NAV_JOINT_HEADING, sign * (ay * lx - ax * ly));
-    nav_linear_add(&v->form, NAV_JOINT_LATTICE_TURN, sign * (first ? at[1] : -at[0]));
-    nav_linear_add(&v->form, first ? NAV_JOINT_LATTICE_U : NAV_JOINT_LATTICE_V, -sign);
-    nav_linear_add(&v->form, NAV_JOINT_PITCH, -sign * (first ? line_u : line_w));
+    struct floor_place p = floor_place(f, j->mean, x, y);
+    double line[2] = {round(p.tile[0]), round(p.tile[1])};
+    double off[2] = {p.tile[0] - line[0], p.tile[1] - line[1]};
+    int axis = fabs(off[0]) < fabs(off[1]) ? 0 : 1, step = off[axis] < 0.0 ? -1 : 1;
+    *v = (struct floor_view){.column = (int)floor(p.tile[0]),
+                             .row = (int)floor(p.tile[1]),
+                             .off = fabs(off[axis]) * j->mean[NAV_JOINT_PITCH],
+                             .form = floor_form(&p, axis, line[axis], step)};
+    v->across_column = axis ? v->column : v->column - step;
+    v->across_row = axis ? v->row - step : v->row;
 }
 
 static void floor_forget(struct nav_floor *f)
 {
     memset(f->tile, 0, (size_t)NAV_FLOOR_SIDE * NAV_FLOOR_SIDE * (size_t)f->classes * sizeof *f->tile);
     f->agreement = 0.0;
+    f->begun++;
 }
 
 /* A floor that keeps being otherwise is learned anew. */
@@ -121,12 +154,42 @@ static double floor_agree(struct nav_floor *f, double log_likelihood)
     return log_likelihood;
 }
 
-void nav_floor_at(const struct nav_floor *f, const struct nav_joint *j, double x, double y, int *column, int *row)
+static double floor_spread(const struct floor_view *v, const struct nav_joint *j)
+{
+    return sqrt(nav_joint_variance(j, &v->form) + BLUR_M * BLUR_M);
+}
+
+double nav_floor_at(const struct nav_floor *f, const struct nav_joint *j, double x, double y, int *column, int *row)
 {
     struct floor_view v;
     floor_look(f, j, x, y, &v);
     *column = v.column;
     *row = v.row;
+    return 1.0 - floor_beyond(v.off / floor_spread(&v, j));
+}
+
+void nav_floor_spread(const struct nav_floor *f, const struct nav_joint *j, double x, double y, double out[3])
+{
+    struct floor_place p = floor_place(f, j->mean, x, y);
+    struct nav_linear form[2], both;
+    for (int axis = 0; axis < 2; axis++)
+        form[axis] = floor_form(&p, axis, round(p.tile[axis]), 1.0);
+    both = nav_linear_sum(&form[0], &form[1]);
+    out[0] = nav_joint_variance(j, &form[0]);
+    out[2] = nav_joint_variance(j, &form[1]);
+    out[1] = 0.5 * (nav_joint_variance(j, &both) - out[0] - out[2]);
+}
+
+void nav_floor_middle(const struct nav_floor *f, const struct nav_joint *j, int column, int row, double *x, double *y)
+{
+    const double *m = j->mean;
+    double u = m[NAV_JOINT_LATTICE_U] + (column + 0.5) * m[NAV_JOINT_PITCH];
+    double v = m[NAV_JOINT_LATTICE_V] + (row + 0.5) * m[NAV_JOINT_PITCH];
+    double nx = cos(m[NAV_JOINT_LATTICE_TURN]), ny = sin(m[NAV_JOINT_LATTICE_TURN]);
+    double dx = f->x + nx * u - ny * v - m[NAV_JOINT_X], dy = f->y + ny * u + nx * v - m[NAV_JOINT_Y];
+    double c = cos(m[NAV_JOINT_HEADING]), s = sin(m[NAV_JOINT_HEADING]);
+    *x = c * dx + s * dy;
+    *y = c * dy - s * dx;
 }
 
 /* The window is of the tip's own tile with the probability that the tip is on this side; the moments of the Gaussian
@@ -139,7 +202,7 @@ double nav_floor_take(struct nav_floor *f, struct nav_joint *j, double x, double
     floor_look(f, j, x, y, &v);
     float *own = floor_tile(f, v.column, v.row), *across = floor_tile(f, v.across_column, v.across_row);
     double variance = nav_joint_variance(j, &v.form), sd = sqrt(variance + BLUR_M * BLUR_M), z = v.off / sd;
-    double a = floor_ratio(f, own, ratio), b = floor_ratio(f, across, ratio), beyond = 0.5 * erfc(z / sqrt(2.0));
+    double a = floor_ratio(f, own, ratio), b = floor_ratio(f, across, ratio), beyond = floor_beyond(z);
     if (z > NEAR) {
         floor_learn(f, own, 1.0, ratio);
         return floor_agree(f, log(a));

@@ -39,6 +39,15 @@ static inline void nav_linear_add(struct nav_linear *l, int index, double slope)
     l->slope[l->terms++] = slope;
 }
 
+/* The form `a` plus the form `b`. */
+static inline struct nav_linear nav_linear_sum(const struct nav_linear *a, const struct nav_linear *b)
+{
+    struct nav_linear sum = *a;
+    for (int n = 0; n < b->terms; n++)
+        nav_linear_add(&sum, b->index[n], b->slope[n]);
+    return sum;
+}
+
 /* Begins with the pose at the origin, known; nothing of the world is. */
 void nav_joint_begin(struct nav_joint *, double distance_sigma, double turn_sigma);
 

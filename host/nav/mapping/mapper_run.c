@@ -4,6 +4,7 @@
 
 #include "gaussian.h"
 #include "kidnap.h"
+#include "loops.h"
 
 static const double SCALE_LEAST = 0.3, SCALE_MOST = 1.5; /* of the odometry's noise */
 static const double BEHIND = 30.0;                       /* nats at which a particle is given up */
@@ -177,21 +178,27 @@ static void mapper_answer(const struct nav_mapper *m, struct nav_estimate *out)
                  nav_record_bytes(&m->record) + nav_kidnap_bytes(&m->record);
 }
 
-/* Notes the loop that the likeliest hypothesis has just closed. */
-static void mapper_close(struct nav_mapper *m, long row)
+static void mapper_note(struct nav_mapper *m, const struct nav_closure *c)
 {
-    const struct nav_faces *faces = &nav_mapper_best(m)->faces;
-    const struct nav_closure *c = &faces->closure;
-    if (faces->noted != row)
-        return;
     m->loop[m->loops++ % NAV_MAPPER_LOOPS] = (struct nav_mapper_loop){.from = c->then.row,
                                                                       .to = c->now.row,
                                                                       .from_x = c->then.x,
                                                                       .from_y = c->then.y,
                                                                       .x = c->now.x,
                                                                       .y = c->now.y,
-                                                                      .probability = c->probability,
-                                                                      .part = m->course.part};
+                                                                      .probability = 1.0 - c->doubt,
+                                                                      .part = m->course.part,
+                                                                      .kind = (int)c->kind};
+}
+
+/* Notes the loops that were closed by a row. */
+static void mapper_close(struct nav_mapper *m, long row)
+{
+    struct nav_closure closure[NAV_LOOPS_MOST];
+    struct nav_loops loops = {m->particle, m->options.particles, nav_mapper_best(m), row};
+    int count = nav_loops_close(&loops, &m->course.sequence, closure);
+    for (int n = 0; n < count; n++)
+        mapper_note(m, &closure[n]);
 }
 
 void nav_mapper_step(struct nav_mapper *m, const struct nav_row *row, struct nav_estimate *out)

@@ -21,15 +21,6 @@ struct segment_choice {
     double total;
 };
 
-/* The form `a` plus the form `b`. */
-static struct nav_linear segment_sum(const struct nav_linear *a, const struct nav_linear *b)
-{
-    struct nav_linear sum = *a;
-    for (int n = 0; n < b->terms; n++)
-        nav_linear_add(&sum, b->index[n], b->slope[n]);
-    return sum;
-}
-
 static void segment_match_face(const struct nav_face *g, const struct nav_joint *j, const struct nav_touches_line *line,
                                struct segment_match *m)
 {
@@ -46,7 +37,7 @@ static void segment_match_face(const struct nav_face *g, const struct nav_joint 
     m->place = v.form;
     m->off = v.off;
     m->along = v.along;
-    struct nav_linear both = segment_sum(&m->angle, &v.form);
+    struct nav_linear both = nav_linear_sum(&m->angle, &v.form);
     double turned = nav_joint_variance(j, &m->angle), angle_var = turned + line->normal_var;
     double cross = 0.5 * (nav_joint_variance(j, &both) - turned - v.variance);
     /* The offset given the turn. */
@@ -106,16 +97,23 @@ static int segment_choose(const struct segment_choice *c, int count, double chan
     return best;
 }
 
+/* Probability of the chosen face, for a closure: faces not in the map are as dense as contacts with them are. */
+static double segment_probability(const struct nav_faces *f, const struct segment_choice *c, int chosen, double fresh)
+{
+    double added = (fresh / NAV_FACE_NEW_PER_M - 1.0) * (c->likelihood[f->count] + c->likelihood[f->count + 1]);
+    return c->likelihood[chosen] / (c->total + added);
+}
+
 static void segment_of_face(struct nav_faces *f, struct nav_face *g, struct nav_joint *j,
                             const struct nav_touches_line *line, const struct segment_match *m, double probability)
 {
     double known = sqrt(fmax(nav_joint_variance(j, &m->place), 0.0));
-    nav_faces_feel(f, g, (struct nav_touch){.x = line->x, .y = line->y}, known, probability, SEGMENT_HITS);
     nav_joint_measure(j, &m->place, -m->off, line->offset_var + NAV_FACE_ROUGH_M * NAV_FACE_ROUGH_M);
     double turn = nav_wrap(j->mean[NAV_JOINT_HEADING] + line->normal - j->mean[g->index]);
     nav_joint_measure(j, &m->angle, -turn, line->normal_var);
     nav_face_feel(g, m->along - line->span / 2.0, m->along + line->span / 2.0);
     g->hits += SEGMENT_HITS;
+    nav_faces_feel(f, g, j, &(struct nav_feel){line->x, line->y, m->along, known, probability, SEGMENT_HITS});
 }
 
 static void segment_to_axes(const struct nav_face *g, struct nav_joint *j)
@@ -141,13 +139,15 @@ static void segment_add(struct nav_faces *f, struct nav_joint *j, const struct n
     struct nav_face *g = &f->face[f->count++];
     *g = (struct nav_face){.anchor_x = m[NAV_JOINT_X] + lx, .anchor_y = m[NAV_JOINT_Y] + ly, .right = right};
     g->hits = SEGMENT_HITS;
-    g->seen = (struct nav_sighting){f->row, f->way, line->x, line->y};
+    g->number = f->made++;
+    nav_stretch_begin(&g->stretch, (struct nav_sighting){f->row, f->way, line->x, line->y}, SEGMENT_HITS);
     g->index = nav_joint_add(j, normal, &direction, line->normal_var);
     (void)nav_joint_add(j, 0.0, &offset, line->offset_var + NAV_FACE_ROUGH_M * NAV_FACE_ROUGH_M);
     nav_face_feel(g, -line->span / 2.0, line->span / 2.0);
     *(right ? &f->right : &f->refused) += 1.0;
     if (right)
         segment_to_axes(g, j);
+    nav_faces_meet(f, g, j);
 }
 
 /* Log-likelihood of the segment's contacts, over all of them as of no face. Two of them fix the line. */
@@ -172,7 +172,8 @@ static double segment_place(struct nav_faces *f, struct nav_joint *j, const stru
         return nav_faces_drain(f, j, touches, line->used, contact, true);
     f->loose &= ~line->used;
     if (chosen < count)
-        segment_of_face(f, &f->face[chosen], j, line, &choice.match[chosen], choice.likelihood[chosen] / choice.total);
+        segment_of_face(f, &f->face[chosen], j, line, &choice.match[chosen],
+                        segment_probability(f, &choice, chosen, nav_faces_fresh(contact)));
     else if (count < NAV_FACES_MOST)
         segment_add(f, j, line, chosen == count);
     return score;

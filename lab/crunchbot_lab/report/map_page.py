@@ -209,7 +209,7 @@ def brought(parts: dict, motion: Motion) -> dict:
 
     faces = [[*point(f[0], f[1]), *point(f[2], f[3]), round(f[4] + motion.turn, 4), *f[5:]] for f in parts["faces"]]
     corners = [[*point(c[0], c[1]), c[2]] for c in parts["corners"]]
-    loops = [[*p[:2], *point(p[2], p[3]), *point(p[4], p[5]), p[6]] for p in parts["loops"]]
+    loops = [[*p[:2], *point(p[2], p[3]), *point(p[4], p[5]), *p[6:]] for p in parts["loops"]]
     lattice, grid = parts["lattice"], parts["grid"]
     if lattice:
         lattice = [*point(*lattice[:2]), round(lattice[2] + motion.turn, 4), lattice[3]]

@@ -1,84 +1,91 @@
 """What a mapper says has happened, against the truth: loops that closed, and kidnaps that were noticed and joined."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from crunchbot.nav.mapper import LOOP_KINDS
 from crunchbot.nav.mapping import Mapped
 from crunchbot.scene import Arena
 
-from .geometry import compose
-from .map_scoring import best_motion, true_faces
+from .map_meetings import Meeting, at, of_corners, of_faces, of_tiles, planes, touched
+from .map_scoring import best_motion
 
-SURE = 0.999  # of a closure, to be judged
-NEAR_M = 0.03  # of a touched point from a face that it may be of
-AWAY_M = 1.0  # way without a face after which meeting it again is a closure that could be made
-LATE_ROWS = 30  # after such a meeting, within which a closure of it must come
+CORNER_M = 0.1  # between both places of a corner that is one
+LATE_ROWS = 30  # after a meeting, within which a closure of it must come
 FALSE_M = 0.3  # median error after a join that is a false one
 AFTER_ROWS = 100  # that it is judged by
 
 
-def _planes(arena: Arena) -> np.ndarray:
-    """(faces,) number of the plane of each true face: faces in one line with one normal are one thing to a mapper."""
-    faces = true_faces(arena)
-    off = np.cos(faces[:, 4]) * faces[:, 0] + np.sin(faces[:, 4]) * faces[:, 1]
-    return np.unique(np.round(np.column_stack([faces[:, 4], off]), 3), axis=0, return_inverse=True)[1].reshape(-1)
+@dataclass(frozen=True)
+class Judged:
+    """A closure against the truth: whether both times it was one thing; of a face, whether of one face of the arena."""
+
+    row: int
+    right: bool
+    same: bool
+    planes: frozenset[int]  # of faces: that both points are of
+    place: np.ndarray  # (2,) m, where the thing was met
+
+    def closes(self, meeting: Meeting) -> bool:
+        """Whether this is the closure of that meeting."""
+        near = math.isnan(meeting.x) or math.hypot(*(self.place - (meeting.x, meeting.y))) <= CORNER_M
+        there = not self.planes or meeting.thing in self.planes
+        return self.right and near and there and meeting.first <= self.row <= meeting.last + LATE_ROWS
 
 
-def _touched(arena: Arena, pose: np.ndarray, point: np.ndarray) -> set[int]:
-    """True faces that a touched point (2,) of the robot's frame at a true pose (3,) may be of; the nearest always."""
-    faces = true_faces(arena)
-    at = compose(pose[None], np.array([*point, 0.0]))[0, :2]
-    low, high = np.minimum(faces[:, :2], faces[:, 2:4]), np.maximum(faces[:, :2], faces[:, 2:4])
-    off = np.hypot(*(at - np.clip(at, low, high)).T)
-    before = np.cos(faces[:, 4]) * (pose[0] - faces[:, 0]) + np.sin(faces[:, 4]) * (pose[1] - faces[:, 1]) > 0.0
-    off = np.where(before, off, np.inf)
-    return set(np.flatnonzero(off <= max(NEAR_M, off.min())).tolist())
+def _judge_face(mapped: Mapped, arena: Arena, loop: np.void) -> Judged:
+    truth, plane_of = mapped.rows.truth, planes(arena)
+    now = touched(arena, truth[loop["to"]], np.array([loop["x"], loop["y"]]))
+    then = touched(arena, truth[loop["from"]], np.array([loop["from_x"], loop["from_y"]]))
+    both = frozenset(plane_of[list(now)].tolist()) & frozenset(plane_of[list(then)].tolist())
+    return Judged(int(loop["to"]), bool(both), bool(now & then), both, at(truth[loop["to"]], loop["x"], loop["y"]))
+
+
+def _judge_place(mapped: Mapped, within_m: float, loop: np.void) -> Judged:
+    now = at(mapped.rows.truth[loop["to"]], loop["x"], loop["y"])
+    then = at(mapped.rows.truth[loop["from"]], loop["from_x"], loop["from_y"])
+    one = math.hypot(*(now - then)) <= within_m
+    return Judged(int(loop["to"]), one, one, frozenset(), now)
+
+
+def judged(mapped: Mapped, arena: Arena, kind: str) -> list[Judged]:
+    """The closures of a kind, in their order."""
+    loops, lattice = mapped.touched.loops, mapped.touched.lattice
+    mine = loops[loops["kind"] == LOOP_KINDS.index(kind)]
+    if kind == "face":
+        return [_judge_face(mapped, arena, loop) for loop in mine]
+    tile_m = lattice.pitch if lattice else arena.tile_m
+    return [_judge_place(mapped, CORNER_M if kind == "corner" else tile_m / 2, loop) for loop in mine]
 
 
 def closures_score(mapped: Mapped, arena: Arena) -> dict[str, float | None]:
-    """Closures of probability SURE and more. One is right when both touched points are of one plane of the true arena,
-    `closures_same` counts those of one face of it. Recall: of the meetings of a plane after AWAY_M without it, the share
-    with a right closure within LATE_ROWS."""
-    truth, planes = mapped.rows.truth, _planes(arena)
-    loops = mapped.touched.loops[mapped.touched.loops["probability"] >= SURE]
-    right, same, closed = [], [], []
-    for loop in loops:
-        now = _touched(arena, truth[loop["to"]], np.array([loop["x"], loop["y"]]))
-        then = _touched(arena, truth[loop["from"]], np.array([loop["from_x"], loop["from_y"]]))
-        both = set(planes[list(now)]) & set(planes[list(then)])
-        right.append(bool(both))
-        same.append(bool(now & then))
-        closed += [(int(loop["to"]), plane) for plane in both]
-    met = _meetings(mapped, arena, planes)
-    found = [any(p == plane and 0 <= row - k <= LATE_ROWS for row, p in closed) for k, plane in met]
-    return {
-        "closures": float(len(loops)),
-        "closures_right": float(np.mean(right)) if right else None,
-        "closures_same": float(np.mean(same)) if same else None,
-        "closures_recall": float(np.mean(found)) if found else None,
-    }
+    """Of each kind of closure: how many there are, the share that is right, the share that the mapper itself expects to be
+    false (`stated_false`: the mean of 1 - probability), and of the true meetings of such things the share with a right
+    closure in time (`recall`). Names of those of faces have nothing before them.
+
+    Of a face, one is right when both touched points are of one plane of the true arena; `closures_same` counts those of
+    one face of it. Of a corner or tiles, when both places are one, within CORNER_M or half a tile.
+    """
+    loops, found = mapped.touched.loops, {}
+    for kind, meetings in zip(LOOP_KINDS, (of_faces, of_corners, of_tiles), strict=True):
+        mine, before = judged(mapped, arena, kind), "" if kind == "face" else f"{kind}_"
+        stated = 1.0 - loops["probability"][loops["kind"] == LOOP_KINDS.index(kind)]
+        closed = [any(one.closes(meeting) for one in mine) for meeting in meetings(mapped, arena)]
+        found |= {
+            f"{before}closures": float(len(mine)),
+            f"{before}closures_right": _mean([one.right for one in mine]),
+            f"{before}closures_stated_false": _mean(stated.tolist()),
+            f"{before}closures_recall": _mean(closed),
+        }
+        if kind == "face":
+            found["closures_same"] = _mean([one.same for one in mine])
+    return found
 
 
-def _meetings(mapped: Mapped, arena: Arena, planes: np.ndarray) -> list[tuple[int, int]]:
-    """(row, plane) where a whisker truly meets a plane again after a way of AWAY_M without it."""
-    truth = mapped.rows.truth
-    way = np.append(0.0, np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T)))
-    last: dict[int, float] = {}
-    out = []
-    for number, whisker in enumerate(mapped.robot.of_role("object")):
-        assert whisker.base_m is not None
-        read = mapped.rows.radial_m[:, number]
-        for row in np.flatnonzero(np.isfinite(read)):
-            along = np.array([math.cos(whisker.yaw_rad), math.sin(whisker.yaw_rad)])
-            faces = _touched(arena, truth[row], np.array(whisker.base_m) + read[row] * along)
-            out += [(int(row), int(plane)) for plane in {*planes[list(faces)]} if len(faces) == 1]
-    met = []
-    for row, plane in sorted(out):
-        if plane in last and way[row] - last[plane] > AWAY_M:
-            met.append((row, plane))
-        last[plane] = way[row]
-    return met
+def _mean(values: list) -> float | None:
+    return float(np.mean(values)) if values else None
 
 
 def kidnaps_score(mapped: Mapped, kidnaps: tuple[int, ...]) -> dict[str, float | None]:

@@ -4,8 +4,6 @@
 
 #include "mapper_state.h"
 
-static const double MEET_M = 0.1;                 /* from the ends of two faces to the corner that they make */
-static const double WIDE = 0.5;                   /* sine of the angle between them, at least */
 static const double DEEP_M = 0.05, BLUR_M = 0.01; /* of what is solid behind a face; of its surface */
 
 /* The stretch of a face from cell `from` on that was felt; returns the cell after it. */
@@ -45,30 +43,8 @@ long nav_mapper_faces(const struct nav_mapper *m, struct nav_mapper_face *out, l
     return count;
 }
 
-/* A face as a line: normal . (x, y) = offset. */
-struct mapper_line {
-    double nx, ny, offset;
-};
-
-static struct mapper_line mapper_line(const struct nav_particle_map *p, const struct nav_face *g)
-{
-    double nx = cos(p->joint.mean[g->index]), ny = sin(p->joint.mean[g->index]);
-    return (struct mapper_line){nx, ny, nx * g->anchor_x + ny * g->anchor_y + p->joint.mean[g->index + 1]};
-}
-
-/* Whether a felt stretch of the face ends near there. */
-static bool mapper_ends(const struct nav_face *g, const struct mapper_line *l, double x, double y)
-{
-    double along = l->nx * (y - g->anchor_y) - l->ny * (x - g->anchor_x), low, high;
-    for (int cell = nav_face_stretch(g, 0, &low, &high); cell > 0; cell = nav_face_stretch(g, cell, &low, &high)) {
-        if (fmin(fabs(along - low), fabs(along - high)) <= MEET_M)
-            return true;
-    }
-    return false;
-}
-
 /* How far the face moves at a point, along its normal. */
-static struct nav_linear mapper_shift(const struct nav_face *g, const struct mapper_line *l, double x, double y)
+static struct nav_linear mapper_shift(const struct nav_face *g, const struct nav_corner_line *l, double x, double y)
 {
     struct nav_linear form = {.terms = 0};
     nav_linear_add(&form, g->index, l->nx * (g->anchor_y - y) - l->ny * (g->anchor_x - x));
@@ -80,18 +56,15 @@ static struct nav_linear mapper_shift(const struct nav_face *g, const struct map
 static bool mapper_corner(const struct nav_particle_map *p, int first, int second, struct nav_mapper_corner *out)
 {
     const struct nav_face *g = &p->faces.face[first], *h = &p->faces.face[second];
-    struct mapper_line a = mapper_line(p, g), b = mapper_line(p, h);
-    double det = a.nx * b.ny - a.ny * b.nx;
-    if (fabs(det) < WIDE)
+    struct nav_corner corner;
+    if (!nav_corner_find(g, h, &p->joint, &corner))
         return false;
-    double x = (a.offset * b.ny - b.offset * a.ny) / det, y = (a.nx * b.offset - b.nx * a.offset) / det;
-    if (!mapper_ends(g, &a, x, y) || !mapper_ends(h, &b, x, y))
-        return false;
-    struct nav_linear of_a = mapper_shift(g, &a, x, y), of_b = mapper_shift(h, &b, x, y), both = of_a;
-    for (int n = 0; n < of_b.terms; n++)
-        nav_linear_add(&both, of_b.index[n], of_b.slope[n]);
+    double x = corner.x, y = corner.y;
+    struct nav_corner_line a = corner.line[0], b = corner.line[1];
+    struct nav_linear of_a = mapper_shift(g, &a, x, y), of_b = mapper_shift(h, &b, x, y),
+                      both = nav_linear_sum(&of_a, &of_b);
     double v = nav_joint_variance(&p->joint, &of_a), w = nav_joint_variance(&p->joint, &of_b);
-    double cross = 0.5 * (nav_joint_variance(&p->joint, &both) - v - w), scale = 1.0 / (det * det);
+    double cross = 0.5 * (nav_joint_variance(&p->joint, &both) - v - w), scale = 1.0 / (corner.sine * corner.sine);
     *out = (struct nav_mapper_corner){.x = x, .y = y, .face = {first, second}};
     out->xx = scale * (b.ny * b.ny * v - 2.0 * b.ny * a.ny * cross + a.ny * a.ny * w);
     out->xy = scale * (-b.ny * b.nx * v + (b.ny * a.nx + a.ny * b.nx) * cross - a.ny * a.nx * w);

@@ -23,8 +23,9 @@ CORNER = np.dtype([(name, "f8") for name in ("x", "y", "xx", "xy", "yy")] + [("f
 LOOP = np.dtype(
     [(name, "i8") for name in ("from", "to")]
     + [(name, "f8") for name in ("from_x", "from_y", "x", "y", "probability")]
-    + [("part", "i8")]
+    + [("part", "i4"), ("kind", "i4")]
 )
+LOOP_KINDS = ("face", "corner", "texture")  # as enum in host/nav/mapping/mapper.h counts them
 LOOPS = ffi.typeof("struct nav_mapper_loop[]")
 FACES, CORNERS = ffi.typeof("struct nav_mapper_face[]"), ffi.typeof("struct nav_mapper_corner[]")
 assert FACE.itemsize == ffi.sizeof("struct nav_mapper_face")
@@ -84,8 +85,8 @@ class TouchMap:
     """What is believed of the world. `faces`: (n,) of FACE, stretches that were felt; `axes`: direction of their right
     angles, rad, None: not known; `lattice`: None where the evidence is for none. `tiles`: (column, row) of the lattice to
     (index of its likeliest texture, probability). `corners`: (n,) of CORNER, where faces meet, m, with covariance, m^2.
-    `loops`: (n,) of LOOP, those that closed so far, the last 4096 at most: at row `to` a whisker touched (x, y) m of the
-    robot's frame, a face that it had touched last at row `from`. `frame`: number of the part of the run (Mapper.parts)
+    `loops`: (n,) of LOOP, those that closed so far, the last 4096 at most: at row `to` the robot met, at (x, y) m of its
+    frame, a thing that it had met last at row `from`; `kind`: index of LOOP_KINDS; `probability`: that it is one thing. `frame`: number of the part of the run (Mapper.parts)
     whose first pose is the origin.
     """
 

@@ -17,7 +17,7 @@ from .grid_mapper import GridMapper
 from .map_choice import evidence_of
 from .map_graph import GraphMapper
 from .map_scene import CELL_M, MapScene, map_scene
-from .mapper import PATCH_M, Mapper, Part, TouchMap
+from .mapper import LOOP_KINDS, PATCH_M, Mapper, Part, TouchMap
 from .observations import Observations, read_observations
 
 CHUNK = 100  # rows between two steps of the progress bar
@@ -216,10 +216,10 @@ def _corners(touched: TouchMap, origin: Pose) -> list[str]:
 
 def _closures(mapped: Mapped) -> list[str]:
     """Loops that closed; times are those of the rows."""
-    lines, t_text = ["t_s,from_t_s,x_m,y_m,from_x_m,from_y_m,probability"], mapped.rows.t_text
+    lines, t_text = ["kind,t_s,from_t_s,x_m,y_m,from_x_m,from_y_m,probability"], mapped.rows.t_text
     for loop in mapped.touched.loops:
         places = (loop["x"], loop["y"], loop["from_x"], loop["from_y"])
-        cells = [t_text[loop["to"]], t_text[loop["from"]], *(f"{v:.4f}" for v in places)]
+        cells = [LOOP_KINDS[loop["kind"]], t_text[loop["to"]], t_text[loop["from"]], *(f"{v:.4f}" for v in places)]
         lines.append(",".join([*cells, f"{loop['probability']:.6f}"]))
     return lines
 

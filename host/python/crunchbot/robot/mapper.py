@@ -233,7 +233,8 @@ def to_grid(header: Header, touched: TouchMap) -> OccupancyGrid:
 def to_message(
     header: Header, seq: int, textures: tuple[str, ...], touched: TouchMap, loops: np.ndarray
 ) -> messages.TouchMap:
-    """The map after row `seq`, without the occupancy; loops (n, 7): time, time before, x, y, x and y before, probability."""
+    """The map after row `seq`, without the occupancy; loops (n, 8): time, time before, x, y, x and y before, probability,
+    kind."""
     found, faces, corners = touched.lattice, touched.faces, touched.corners
     tiles = np.array([(*tile, *said) for tile, said in sorted(touched.tiles.items())]).reshape(-1, 4)
     stretches = (faces[name] for name in ("x0", "y0", "x1", "y1", "normal", "normal_sigma", "offset_sigma"))
@@ -254,11 +255,11 @@ def to_message(
 
 
 def placed(loops: np.ndarray, t_s: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """(n, 7) of the newest LOOPS_MOST loops, as `to_message` has them: of rows at t_s (m,) with poses (m, 3)."""
+    """(n, 8) of the newest LOOPS_MOST loops, as `to_message` has them: of rows at t_s (m,) with poses (m, 3)."""
     newest = loops[-LOOPS_MOST:]
     now, then = poses[newest["to"]], poses[newest["from"]]
     out = [t_s[newest["to"]], t_s[newest["from"]]]
     for pose, x, y in ((now, newest["x"], newest["y"]), (then, newest["from_x"], newest["from_y"])):
         c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
         out += [pose[:, 0] + c * x - s * y, pose[:, 1] + s * x + c * y]
-    return np.column_stack([*out, newest["probability"]])
+    return np.column_stack([*out, newest["probability"], newest["kind"]])

@@ -136,6 +136,7 @@ class TouchMap:
     loop_from_x: np.ndarray
     loop_from_y: np.ndarray
     loop_probability: np.ndarray
+    loop_kind: np.ndarray
 
 
 @dataclass(eq=False)

@@ -6,13 +6,16 @@ const STEP_FIT_M = 0.5; // of what the plan shows, so that it seldom moves
 const NO_CELL = 255;
 const LOOPS_STRONG = 6; // the newest; older ones are as faint as
 const LOOP_FAINT = 0.25;
+const LOOP_KINDS = ['face', 'corner', 'texture'];
+const LOOP_FACE = 0;
+const LOOP_MARKS = [null, [[-1, -1], [1, -1], [1, 1], [-1, 1]], [[0, -1.4], [1.4, 0], [0, 1.4], [-1.4, 0]]]; // of corners and textures
 
 class MapLayer {
   constructor(plan) { this.plan = plan; }
 
   /* { textures, lattice: [x, y, turn, pitch] or null, tiles: [column, row, texture, probability], faces: [x0, y0, x1, y1, normal, its sd,
    * offset's sd], corners: [x, y, sd], loops: [t, t then, x, y, x then, y then,
-   * probability], grid: { x, y, turn, cell, columns, rows, cells: base64 of bytes, per cent or NO_CELL } or null }. */
+   * probability, kind], grid: { x, y, turn, cell, columns, rows, cells: base64 of bytes, per cent or NO_CELL } or null }. */
   draw(pen, map) {
     this.pen = pen;
     if (map.grid) this.occupancy(map.grid);
@@ -23,8 +26,9 @@ class MapLayer {
     map.loops.forEach((loop, n) => this.loop(loop, map.loops.length - 1 - n));
   }
 
-  /* Where a face was touched again: a line from where it had been touched, fainter for those before. */
-  loop([, , x, y, fromX, fromY], before) {
+  /* Where a thing was met again: a line from where it had been met, fainter for those before; a dot for a face, a square for a corner, a rhomb for
+   * tiles. */
+  loop([, , x, y, fromX, fromY, , kind], before) {
     const { plan, pen } = this;
     pen.globalAlpha = Math.max(LOOP_FAINT, 1 - before / LOOPS_STRONG);
     pen.strokeStyle = pen.fillStyle = plan.css('--bad');
@@ -35,11 +39,18 @@ class MapLayer {
     pen.lineTo(plan.x(x), plan.y(y));
     pen.stroke();
     pen.setLineDash([]);
-    pen.beginPath();
-    pen.arc(plan.x(x), plan.y(y), (before ? 3 : 5) * plan.ratio, 0, 2 * Math.PI);
+    this.loopMark(plan.x(x), plan.y(y), (before ? 3 : 5) * plan.ratio, kind);
     if (before) pen.stroke();
     else pen.fill();
     pen.globalAlpha = 1;
+  }
+
+  loopMark(x, y, half, kind) {
+    const { pen } = this;
+    pen.beginPath();
+    if (kind === LOOP_FACE) pen.arc(x, y, half, 0, 2 * Math.PI);
+    else for (let n = 0; n < 4; n += 1) pen.lineTo(x + half * LOOP_MARKS[kind][n][0], y + half * LOOP_MARKS[kind][n][1]);
+    pen.closePath();
   }
 
   occupancy({ x, y, turn, cell, columns, rows, cells }) {
@@ -138,6 +149,7 @@ function mapSaid(map) {
   const tiles = map.lattice ? `tiles of ${signed(map.lattice[3], 3)} m, ${map.tiles.length} felt, ${sure} sure` : 'no tiles found in the floor';
   const area = map.grid ? `${signed(map.grid.free_m2, 1)} m² free` : 'nothing known to be free';
   const last = map.loops.at(-1);
-  const loops = last ? `${map.loops.length}, the last at ${signed(last[0], 1)} s with a face touched ${duration(last[0] - last[1])} before` : 'none closed yet';
+  const counts = LOOP_KINDS.map((kind, n) => `${map.loops.filter((loop) => loop[7] === n).length} ${kind}s`).join(', ');
+  const loops = last ? `${map.loops.length} (${counts}), the last at ${signed(last[0], 1)} s with a ${LOOP_KINDS[last[7]]} met ${duration(last[0] - last[1])} before` : 'none closed yet';
   return { faces, tiles, area, loops, corners: `${map.corners.length}` };
 }
