@@ -38,14 +38,15 @@ def counted(runs, kind: str) -> tuple[int, int, float]:
 
 
 @pytest.mark.parametrize(
-    ("kind", "least", "most_false"), [("face", 120, 0.02), ("corner", 2, 0.02), ("texture", 250, 0.01)]
+    ("kind", "least", "share"), [("face", 120, 0.015), ("corner", 2, 0.01), ("texture", 250, 0.0075)]
 )
-def test_false_closures_are_as_rare_as_they_are_said_to_be(runs, kind, least, most_false):
-    """most_false: the share on other seeds, which a sample may exceed by chance."""
+def test_false_closures_are_as_rare_as_they_are_said_to_be(runs, kind, least, share):
+    """share: of false ones, on other seeds of more families; a sample may exceed it by chance, and no mapper may say that
+    it is far smaller."""
     count, false, stated = counted(runs, kind)
-    assert count >= least and 0.0 < stated <= DOUBT * count
+    assert count >= least and share * count / 2 < stated <= DOUBT * count
     assert false <= stated + SIGMAS * math.sqrt(stated + 1.0)
-    assert false <= most_false * count + SIGMAS * math.sqrt(most_false * count + 1.0)
+    assert false <= share * count + SIGMAS * math.sqrt(share * count + 1.0)
 
 
 def test_meetings_are_closed(runs):

@@ -4,6 +4,7 @@
 #include "arena.h"
 #include "mapper.h"
 #include "near.h"
+#include "segment.h"
 
 enum { CLASSES = 3, TILES = 6, LOOPS_MOST = 64, ROWS_MOST = 1000 };
 
@@ -43,7 +44,39 @@ static void test_contacts_of_one_stretch_are_not_counted_as_fresh(void **state)
     assert_false(s.open); /* its place was known all the time */
 }
 
-/* Of both, felt away from there and now again. */
+/* Six contacts with a wall 0.3 m ahead. */
+static void feel_wall(struct nav_particle_map *map)
+{
+    for (int n = 0; n < 6; n++) {
+        struct nav_touch touch = {.x = 0.3, .y = 0.03 * n, .along_x = 1.0, .variance = 25e-6, .normal = NAN};
+        struct nav_contact contact = {nav_touches_keep(&map->touches, touch), 0.005, 0.2, 0.01};
+        (void)nav_faces_take(&map->faces, &map->joint, &map->touches, &contact);
+        (void)nav_segment_take(&map->faces, &map->joint, &map->touches, &contact, -1.0);
+    }
+}
+
+/* Other faces are as dense as contacts with them are: 0.55 a metre, of all directions, against 8 of one that is known
+ * to 5 cm. */
+static void test_a_row_of_contacts_may_be_of_another_face(void **state)
+{
+    (void)state;
+    struct nav_particle_map map;
+    assert_int_equal(nav_particle_map_init(&map, 1), 0);
+    feel_wall(&map);
+    assert_int_equal(map.faces.count, 1);
+    map.touches.held = map.faces.loose = 0;
+    map.faces.row = 100;
+    map.faces.way = 5.0;
+    nav_joint_set(&map.joint, NAV_JOINT_X, 0.0, 0.05 * 0.05);
+    feel_wall(&map);
+    assert_int_equal(map.faces.count, 1);
+    const struct nav_stretch *s = &map.faces.face[0].stretch;
+    assert_true(s->open && nav_stretch_confirmed(s));
+    assert_true(s->doubt > 0.55 / 4.0 / 8.0 / 2.0 && s->doubt < 0.55 / 8.0);
+    nav_particle_map_free(&map);
+}
+
+/* Its only face was felt at one row, and after a way without it up to another. */
 static void felt_again(struct nav_particle_map *map, long then, long now, double probability)
 {
     struct nav_face *g = &map->faces.face[0];
@@ -281,6 +314,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_evidence_is_counted_in_odds),
         cmocka_unit_test(test_contacts_of_one_stretch_are_not_counted_as_fresh),
+        cmocka_unit_test(test_a_row_of_contacts_may_be_of_another_face),
         cmocka_unit_test(test_hypotheses_vote),
         cmocka_unit_test(test_tiles_read_again_close_a_loop),
         cmocka_unit_test(test_other_tiles_do_not),
