@@ -7,14 +7,16 @@ import pty
 import subprocess
 import sys
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from commandkit import command, live_ring, run, signals_as_before  # noqa: F401 - a fixture
 from patience import PATIENCE_S
-from rings import make_frames
+from rings import make_frames, ring_name
 
 from crunchbot import __version__
+from crunchbot.bridge.ring import Writer
 from crunchbot.cli import COMMANDS, main, parser_of
 from crunchbot.commands import info
 from crunchbot.commands.top import BARS, sparkline
@@ -88,6 +90,28 @@ def test_info_reports_ring_daemon_and_clock(capsys):
         assert reported["clock"]["uncertainty_ns"] == 5000.0 and reported["host"]["wire_version"] == WIRE_VERSION
         assert reported["host"]["version"] == __version__ and reported["advice"] == []
         assert "  serial: B0042" in run(capsys, "info", "--ring", name)[1]
+
+
+@pytest.mark.parametrize(
+    ("frames", "look_s", "looks", "answered"),
+    [(100, 9.0, 5, True), (4000, 0.05, 99, False), (0, 3.0, 99, False)],
+    ids=["a world slower than life", "frames, and no answer", "no frames"],
+)
+def test_the_nodes_answer_is_waited_for_by_the_bridges_own_time(monkeypatch, capsys, frames, look_s, looks, answered):
+    seen = []
+    with Writer(ring_name(), 4096) as writer:
+
+        def look(_: str) -> tuple[str, int] | None:
+            seen.append(len(seen))
+            writer.publish(make_frames(frames, first=seen[-1] * frames))
+            return ("lane 0", 1) if len(seen) == looks else None
+
+        clock = SimpleNamespace(monotonic=lambda: look_s * len(seen), sleep=lambda _: None)
+        monkeypatch.setattr(info, "time", clock)
+        monkeypatch.setattr(info, "read_nodes", look)
+        assert info.print_answer(writer.name, None) is answered
+    out, err = capsys.readouterr()
+    assert (out, "has not answered within 10 s" in err) == ("lane 0" * answered, not answered)
 
 
 def test_info_names_versions_and_what_does_not_fit():
