@@ -29,16 +29,28 @@ static bool corner_ends(const struct nav_face *g, double along)
     return false;
 }
 
-bool nav_corner_find(const struct nav_face *g, const struct nav_face *h, const struct nav_joint *j,
-                     struct nav_corner *out)
+/* Where the lines of two faces cross. False: at no wide angle. */
+static bool corner_cross(const struct nav_face *g, const struct nav_face *h, const struct nav_joint *j,
+                         struct nav_corner *out)
 {
     struct nav_corner_line a = corner_line(g, j), b = corner_line(h, j);
     double det = a.nx * b.ny - a.ny * b.nx;
-    if (fabs(det) < WIDE)
-        return false;
     double x = (a.offset * b.ny - b.offset * a.ny) / det, y = (a.nx * b.offset - b.nx * a.offset) / det;
     *out = (struct nav_corner){.x = x, .y = y, .sine = det, .line = {a, b}};
-    return corner_ends(g, nav_corner_along(g, &a, x, y)) && corner_ends(h, nav_corner_along(h, &b, x, y));
+    return fabs(det) >= WIDE;
+}
+
+/* Whether stretches of both that were felt end there. */
+static bool corner_both_end(const struct nav_face *g, const struct nav_face *h, const struct nav_corner *c)
+{
+    return corner_ends(g, nav_corner_along(g, &c->line[0], c->x, c->y)) &&
+           corner_ends(h, nav_corner_along(h, &c->line[1], c->x, c->y));
+}
+
+bool nav_corner_find(const struct nav_face *g, const struct nav_face *h, const struct nav_joint *j,
+                     struct nav_corner *out)
+{
+    return corner_cross(g, h, j, out) && corner_both_end(g, h, out);
 }
 
 /* In place of the one that was felt the longest ago, where there is no room. */
@@ -78,8 +90,8 @@ void nav_corners_feel(struct nav_corners *c, const struct nav_face *g, const str
 {
     struct nav_sighting now = g->stretch.last;
     struct nav_corner corner;
-    if (now.way - h->stretch.last.way > SHORTLY_M || !nav_corner_find(g, h, j, &corner) ||
-        !corner_near(g, &corner, 0) || !corner_near(h, &corner, 1))
+    if (now.way - h->stretch.last.way > SHORTLY_M || !corner_cross(g, h, j, &corner) || !corner_near(g, &corner, 0) ||
+        !corner_near(h, &corner, 1) || !corner_both_end(g, h, &corner))
         return;
     double dx = corner.x - j->mean[NAV_JOINT_X], dy = corner.y - j->mean[NAV_JOINT_Y];
     double cosine = cos(j->mean[NAV_JOINT_HEADING]), sine = sin(j->mean[NAV_JOINT_HEADING]);
