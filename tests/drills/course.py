@@ -103,7 +103,7 @@ class Course:
 
     def _wait(self, wanted, patience_s: float, machine: Machine, witness: Witness) -> bool:
         """False: it did not come to be."""
-        return witness.await_true(lambda: wanted() or machine.over, patience_s) and wanted()
+        return witness.await_true(lambda: wanted() or machine.over, patience_s) and bool(wanted())
 
     def _pass(self, seconds: float, machine: Machine, witness: Witness) -> None:
         """Lets a drawn time pass, or what is left of the run."""
