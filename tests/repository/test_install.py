@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import time
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -105,9 +106,11 @@ def test_examples_of_filters_and_base_work(examples, tmp_path):
     link = tmp_path / "create"
     with running([program("whisker-create-sim"), "--link", link], stdout=subprocess.PIPE) as process:
         process.stdout.readline()
+        begun = time.monotonic()
         ahead = run(examples / "drive_base", link)
-    # Two seconds at 0.1 m/s; the base takes its time to speed up.
-    assert 0.17 < float(ahead.split()[0]) < 0.21, ahead
+        seconds = time.monotonic() - begun
+    # At 0.1 m/s for two seconds, or longer where the machine is late; the base takes its time to speed up.
+    assert 0.17 < float(ahead.split()[0]) < 0.21 * max(seconds / 2.0, 1.0), ahead
 
 
 def test_a_plain_configure_builds_and_installs_the_host_without_python_cpp_and_cmocka(tmp_path):

@@ -107,7 +107,7 @@ static bool touches_regress(const struct nav_touches *t, uint64_t on, double nx,
     if (!(spread > 0.0))
         return false;
     double slope = both / spread, residual = left - slope * both;
-    *out = (struct nav_touches_line){.normal = atan2(ny, nx) + atan(slope),
+    *out = (struct nav_touches_line){.normal = atan2(ny, nx) - atan(slope),
                                      .x = nx * off - ny * along,
                                      .y = ny * off + nx * along,
                                      .normal_var = 1.0 / spread + s.turned,

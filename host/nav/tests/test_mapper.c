@@ -47,6 +47,27 @@ static void test_contacts_in_a_row_make_a_line(void **state)
     assert_false(nav_touches_fit(&t, last, line.used & ~7ULL, &line));
 }
 
+/* The line's first guess goes through two of the contacts; least squares turns it towards the others. */
+static void test_a_line_through_contacts_that_scatter_is_the_one_of_least_squares(void **state)
+{
+    (void)state;
+    struct nav_touches t = {.held = 0};
+    struct nav_touches_line line;
+    const double off[] = {0.002, -0.002, 0.0, 0.001, -0.001, 0.002};
+    double slope = 0.0, squares = 0.0;
+    int last = 0;
+    for (int n = 0; n < 6; n++) {
+        double y = 0.05 * n - 0.125;
+        last = nav_touches_keep(
+            &t, (struct nav_touch){.x = 0.3 + 0.1 * y + off[n], .y = y, .along_x = 1.0, .variance = 4e-6});
+        slope += y * (0.1 * y + off[n]);
+        squares += y * y;
+    }
+    assert_true(nav_touches_fit(&t, last, t.held, &line));
+    assert_int_equal(nav_touches_count(line.used), 6);
+    assert_near(nav_wrap(line.normal - NAV_PI), -atan(slope / squares), 1e-4);
+}
+
 static void step(void *mapper, const struct nav_row *row, struct nav_estimate *out)
 {
     nav_mapper_step(mapper, row, out);
@@ -129,6 +150,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_measurement_corrects_what_is_correlated),
         cmocka_unit_test(test_contacts_in_a_row_make_a_line),
+        cmocka_unit_test(test_a_line_through_contacts_that_scatter_is_the_one_of_least_squares),
         cmocka_unit_test(test_a_wall_felt_again_corrects_the_pose),
         cmocka_unit_test(test_without_contacts_it_is_never_surer),
         cmocka_unit_test(test_bad_cells_are_counted_and_not_read),

@@ -5,79 +5,71 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mapkit import MANY, SEEDS, errors, errors_of, map_made, mapped
 
-from crunchbot.nav import mapping
-from crunchbot_lab.scenes import map_scoring
 from crunchbot_lab.scenes.arenas import scattered
 from crunchbot_lab.scenes.families import recipe
 from crunchbot_lab.scenes.faults import MINUTE_ROWS
-from crunchbot_lab.scenes.making import make, make_recipe
+from crunchbot_lab.scenes.making import make_recipe
 
 ROWS = 1500
-
-
-def run(made):
-    return mapping.run(made.scene.robot, made.scene.arena.textures, made.observations)
-
-
-def errors(mapped) -> tuple[float, float]:
-    """Medians in m, of the mapper and of odometry alone."""
-    truth = mapped.rows.truth
-    mine = map_scoring.trajectory(mapped.table["pose"], truth)
-    wheels = map_scoring.trajectory(map_scoring.odometry_path(mapped.rows.odometry), truth)
-    return mine["error_median_m"], wheels["error_median_m"]
+BETTER = len(SEEDS) - 1  # scenes in which it does no harm, at least
+UNHARMED = 10  # the same, of MANY
 
 
 @pytest.mark.parametrize("pitch", [0.3, 0.42])
 def test_tiles_of_other_sizes_are_found(pitch):
-    mapped = run(make(f"anchor+pitch-{pitch:g}", 21, ROWS))
-    assert mapped.touched.lattice is not None
-    assert abs(mapped.touched.lattice.pitch - pitch) < 0.02
-    mine, wheels = errors(mapped)
-    assert mine < max(0.7 * wheels, 0.03)
+    family = f"anchor+pitch-{pitch:g}"
+    lattices = [mapped(family, seed, ROWS)[1].touched.lattice for seed in SEEDS]
+    assert sum(lattice is not None and abs(lattice.pitch - pitch) < 0.02 for lattice in lattices) >= BETTER
+    mine, wheels = errors(family, ROWS)
+    assert (mine < np.maximum(0.7 * wheels, 0.03)).sum() >= BETTER
 
 
 def test_tiles_may_be_turned_against_the_walls():
-    mapped = run(make("anchor+turned-tiles", 22, ROWS))
-    mine, wheels = errors(mapped)
-    assert mine < max(0.7 * wheels, 0.03)
-    if mapped.touched.lattice is not None and mapped.touched.axes is not None:
-        off = abs(math.remainder(mapped.touched.lattice.turn - mapped.touched.axes, math.pi / 2))
-        assert off > math.radians(5)
+    mine, wheels = errors("anchor+turned-tiles", ROWS)
+    assert (mine < np.maximum(0.7 * wheels, 0.03)).sum() >= BETTER
+    for seed in SEEDS:
+        touched = mapped("anchor+turned-tiles", seed, ROWS)[1].touched
+        if touched.lattice is not None and touched.axes is not None:
+            off = abs(math.remainder(touched.lattice.turn - touched.axes, math.pi / 2))
+            assert off > math.radians(5)
 
 
-def test_hexagons_do_no_harm():
-    mine, wheels = errors(run(make("anchor+hexagons", 23, ROWS)))
-    assert mine < max(wheels, 0.05)
+@pytest.mark.parametrize(
+    ("family", "rows", "most_m"),
+    [
+        ("anchor+hexagons", ROWS, 0.05),
+        ("anchor+silent-minute", ROWS, 0.06),
+        ("anchor+moving-box", 2 * ROWS, 0.05),
+    ],
+)
+def test_a_world_of_another_kind_does_no_harm(family, rows, most_m):
+    mine, wheels = errors(family, rows)
+    assert (mine < np.maximum(wheels, most_m)).sum() >= BETTER
 
 
 def test_textures_renamed_half_way_do_no_harm():
-    mine, wheels = errors(run(make("anchor+renamed", 24, ROWS)))
-    assert mine < max(wheels, 0.06)
+    mine, wheels = errors("anchor+renamed", ROWS, MANY)
+    assert (mine < np.maximum(wheels, 0.06)).sum() >= UNHARMED
 
 
-def test_a_minute_without_contact_or_texture_is_bounded_and_less_sure():
-    mapped = run(make("anchor+silent-minute", 25, ROWS))
-    spread, first = np.trace(mapped.table["covariance"][:, :2, :2], axis1=1, axis2=2), 2 * ROWS // 5
-    assert spread[first + MINUTE_ROWS - 1] > 2.0 * spread[first]
-    mine, wheels = errors(mapped)
-    assert mine < max(wheels, 0.06)
-
-
-def test_a_box_that_moves_leaves_the_map():
-    mine, wheels = errors(run(make("anchor+moving-box", 26, 2 * ROWS)))
-    assert mine < max(wheels, 0.05)
+def test_a_minute_without_contact_or_texture_is_less_sure():
+    for seed in SEEDS:
+        table, first = mapped("anchor+silent-minute", seed, ROWS)[1].table, 2 * ROWS // 5
+        spread = np.trace(table["covariance"][:, :2, :2], axis1=1, axis2=2)
+        assert spread[first + MINUTE_ROWS - 1] > 2.0 * spread[first]
 
 
 def test_a_round_wall_is_bounded():
-    mapped = run(make("one-texture+round", 27, ROWS))
-    mine, wheels = errors(mapped)
+    _, run = mapped("one-texture+round", 27, ROWS)
+    mine, wheels = errors_of(run)
     assert mine < 2.0 * wheels  # chords of it pass for straight faces
-    assert not all(mapped.touched.faces["right"])
-    assert mapped.scene().arena.obstacles
+    assert not all(run.touched.faces["right"])
+    assert run.scene().arena.obstacles
 
 
 def test_small_rooms_with_boxes_anywhere():
-    made = make_recipe(replace(recipe("anchor"), arena=scattered((1.6, 1.6), (2.4, 2.0))), 28, ROWS)
-    mine, wheels = errors(run(made))
-    assert mine < max(0.8 * wheels, 0.03)
+    small = replace(recipe("anchor"), arena=scattered((1.6, 1.6), (2.4, 2.0)))
+    found = [errors_of(map_made(make_recipe(small, seed, ROWS))) for seed in SEEDS]
+    assert sum(mine < max(0.8 * wheels, 0.03) for mine, wheels in found) >= BETTER

@@ -36,7 +36,7 @@ struct kidnap_entry {
     long begun;
     struct nav_pose pose;
     double sigma_m, sigma_rad;
-    bool bare; /* without the tiles of the floor */
+    enum { TILES_AS_MAPPED, TILES_RENAMED, NO_TILES } floor;
 };
 
 int nav_kidnap_init(struct nav_kidnaps *k, const struct nav_problem *problem)
@@ -199,7 +199,9 @@ static double kidnap_try_at(struct nav_mapper *m, const struct nav_kept *older, 
     struct nav_kidnaps *k = &m->kidnaps;
     nav_kept_copy(&k->joined, &older->map, &older->course);
     k->joined.map.scale = scale;
-    k->joined.map.floor.known &= !entry->bare;
+    k->joined.map.floor.known &= entry->floor != NO_TILES;
+    if (entry->floor == TILES_RENAMED)
+        nav_floor_forget(&k->joined.map.floor);
     nav_kept_enter(&k->joined, entry->begun, entry->pose, entry->sigma_m, entry->sigma_rad);
     while (k->joined.course.row < m->course.row)
         nav_kept_take(&k->joined, &m->record);
@@ -264,8 +266,8 @@ static void kidnap_begin(struct nav_mapper *m)
     while (k->calm.course.row < split)
         nav_kept_take(&k->calm, &m->record);
     struct nav_pose believed = nav_particle_map_pose(&k->calm.map);
-    struct kidnap_entry slip = {split, believed, SLIP_M, SLIP_RAD, false};
-    struct kidnap_entry bare = {split, believed, ENTERED_M, ENTERED_RAD, true};
+    struct kidnap_entry slip = {split, believed, SLIP_M, SLIP_RAD, TILES_AS_MAPPED};
+    struct kidnap_entry bare = {split, believed, ENTERED_M, ENTERED_RAD, NO_TILES};
     double without = kidnap_try(m, &k->calm, &bare) - FLOOR_SHARE * kidnap_floor(&k->calm),
            slipped = kidnap_try(m, &k->calm, &slip);
     if (fmax(without, slipped) > anew - RATHER) {
@@ -298,6 +300,29 @@ static bool kidnap_same(struct nav_pose a, struct nav_pose b)
     return hypot(a.x - b.x, a.y - b.y) < SAME_PLACE_M && fabs(nav_wrap(a.theta - b.theta)) < SAME_PLACE_RAD;
 }
 
+/* Whether the robot was not carried off before the part in use: the rows since then fit where it stood in the older
+ * map, after a slip or with other tiles, clearly better than a map of their own. `joined` is then the older map with
+ * them. */
+static bool kidnap_was_none(struct nav_mapper *m, const struct nav_kept *older)
+{
+    double enough = nav_course_evidence(&m->course, nav_mapper_best(m)) + PROVEN;
+    struct nav_pose believed = nav_particle_map_pose(&older->map);
+    struct kidnap_entry slip = {m->course.begun, believed, SLIP_M, SLIP_RAD, TILES_AS_MAPPED};
+    struct kidnap_entry renamed = {m->course.begun, believed, ENTERED_M, ENTERED_RAD, TILES_RENAMED};
+    return older->course.row == m->course.begun && kidnap_held(m, m->course.begun) &&
+           (kidnap_try(m, older, &slip) > enough || kidnap_try(m, older, &renamed) > enough);
+}
+
+/* Joins the part in use, which is in `joined`, with a map that was kept. */
+static void kidnap_end(struct nav_mapper *m, int which, struct nav_pose at)
+{
+    struct nav_kidnaps *k = &m->kidnaps;
+    struct nav_kept spare = k->kept[which];
+    k->kept[which] = k->kept[--k->count];
+    k->kept[k->count] = spare;
+    kidnap_join(m, kidnap_numbered(k, m->course.part), at);
+}
+
 /* Seeks the map in use in one that was kept. */
 static void kidnap_meet(struct nav_mapper *m)
 {
@@ -305,6 +330,10 @@ static void kidnap_meet(struct nav_mapper *m)
     int which = (int)(m->course.row / SOUGHT_ROWS) % k->count;
     const struct nav_particle_map *best = nav_mapper_best(m);
     struct nav_kept *older = &k->kept[which];
+    if (kidnap_was_none(m, older)) {
+        kidnap_end(m, which, nav_particle_map_pose(&older->map));
+        return;
+    }
     if (nav_meeting_find(&k->meeting, older, best, &m->course) < MET)
         return;
     struct nav_pose at = k->meeting.place[0].at, now = nav_compose(at, nav_particle_map_pose(best));
@@ -318,11 +347,8 @@ static void kidnap_meet(struct nav_mapper *m)
         return;
     /* Where the older map explains the rows worse than the younger, what is known of the pose alone is taken over. */
     if (!held || here < apart - JOINED)
-        (void)kidnap_try(m, older, &(struct kidnap_entry){m->course.row, now, ENTERED_M, ENTERED_RAD, false});
-    struct nav_kept spare = *older;
-    k->kept[which] = k->kept[--k->count];
-    k->kept[k->count] = spare;
-    kidnap_join(m, kidnap_numbered(k, m->course.part), at);
+        (void)kidnap_try(m, older, &(struct kidnap_entry){m->course.row, now, ENTERED_M, ENTERED_RAD, TILES_AS_MAPPED});
+    kidnap_end(m, which, at);
 }
 
 /* Seeks the last rows in the map of before them: whether the robot is in another place of it than is believed. */
