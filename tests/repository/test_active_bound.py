@@ -8,6 +8,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
+from benches import store  # noqa: E402
+from benches.nav import active  # noqa: E402
 from benches.nav import bound as bounds  # noqa: E402
 
 from crunchbot_lab.scenes.closed import Loop  # noqa: E402
@@ -37,3 +39,12 @@ def test_a_body_whisk_must_end_first():
     assert plain["bound_s"] == pytest.approx(
         0.1 + 0.1 * (plain["wanted_bits"] - plain["first_bits"]) / plain["row_bits"]
     )
+
+
+def test_a_mean_below_the_bound_fails_the_bench():
+    families = {"anchor": {"random": {"mean_s": 0.3, "bound_s": 0.2}, "greedy": {"mean_s": 0.19, "bound_s": 0.2}}}
+    with pytest.raises(SystemExit, match=r"^nav_active: anchor, greedy: mean 0.19 s, bound 0.20 s; mend [^\n]*$"):
+        active.refuse_below_bound(families)
+    families["anchor"]["greedy"]["mean_s"] = 0.21
+    active.refuse_below_bound(families)
+    active.refuse_below_bound(store.read_result("nav_active")["families"])

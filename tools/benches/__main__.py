@@ -36,6 +36,7 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
     "nav_paper": "nav.paper",
     "nav_peers": "nav.peer_runs",
     "nav_size": "nav.size",
+    "nav_tasks": "nav.tasks",
     "nav_unseen": "nav.unseen",
     "node": "node.bench",
     "normals": "nav.normals",

@@ -51,6 +51,7 @@ HEADERS = {
             "filter/replay.h",
             "filter/weigh.h",
             "mapping/mapper.h",
+            "planning/coverage.h",
             "planning/planner.h",
             "mapping/grid/grid_mapper.h",
             "mapping/grid/grid_path.h",

@@ -7,6 +7,7 @@ kidnap are the same for every policy, so that runs can be compared pair by pair.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -98,6 +99,8 @@ class Stroller:
 class RandomStroll:
     """As `walk.wander` chooses: straight on until the way is blocked, then a turn by 60 to 180 degrees."""
 
+    remembers = False
+
     def __init__(self, rng: np.random.Generator):
         self._rng = rng
 
@@ -136,6 +139,8 @@ Policy = Callable[["Loop", Choices], Choices]  # what chooses, given the loop an
 class Loop:
     """`run` one seed of a family with a policy. A filter reads along; `belief` is its belief at this moment."""
 
+    look_rows = LOOK_ROWS
+
     def __init__(self, family: str | Recipe, seed: int, policy: Policy, rows: int, filter: str = FAVOURITE):
         self.recipe = recipe(family) if isinstance(family, str) else family
         if self.recipe.faults or self.recipe.slips or self.recipe.map_fault or self.recipe.moves:
@@ -146,17 +151,25 @@ class Loop:
         rng = streams(seed)
         self.robot = self.recipe.robot()
         self.arena = self.recipe.arena(rng["arena"], self.robot.body_radius_m)
-        self._start = walk.draw_pose(self.arena, self.robot.body_radius_m, rng["start"])
+        self.begin = walk.draw_pose(self.arena, self.robot.body_radius_m, rng["start"])
         prior = (
             Prior("uniform")
             if self.recipe.uniform
-            else Prior("gaussian", tuple(map(float, self._start)), (0.02, 0.02, 0.03))
+            else Prior("gaussian", tuple(map(float, self.begin)), (0.02, 0.02, 0.03))
         )
-        self.scene = Scene(self.arena, self.robot, prior)
-        self._filter = Filter(filter, self.scene, seed=seed)
+        self.scene = Scene(self._mapped(), self.robot, prior)
+        self._filter = self._reads_along(filter)
         self._errors: list[np.ndarray] = []
         self._truth: list[np.ndarray] = []
         self._base = self._fed = 0
+
+    def _mapped(self) -> Arena:
+        """The arena as the robot is given it."""
+        return self.arena
+
+    def _reads_along(self, filter: str) -> Any:
+        """What takes the rows by `replay`, and gives (rows,) of ESTIMATE."""
+        return Filter(filter, self.scene, seed=self.seed)
 
     @property
     def vehicle(self) -> Vehicle:
@@ -174,7 +187,7 @@ class Loop:
     def run(self, until_locked: bool = True) -> Outcome:
         """Drives for at most as many rows as were given, from the start or from each."""
         begun = max(self.recipe.kidnap_rows, default=0)
-        self._drive(self._start, self.seed, begun or self._rows, until_locked and not begun)
+        self._drive(self.begin, self.seed, begun or self._rows, until_locked and not begun)
         if begun:
             there = carried_to(
                 self.arena, self.robot.body_radius_m, self._truth_so_far()[-1], streams(self.seed)["kidnap"]
@@ -204,14 +217,14 @@ class Loop:
             self._mover.choices = self._policy(self, RandomStroll(rng))
         for row in range(1, rows + 1):
             self._mover.row()
-            if row % LOOK_ROWS == 0 or row == rows:
+            if row % self.look_rows == 0 or row == rows:
                 self._read()
-                if (
-                    until_locked
-                    and row >= LOCK_ROWS
-                    and lock_row(np.concatenate(self._errors)[self._base :]) is not None
-                ):
+                if self._is_over(row, until_locked):
                     return
+
+    def _is_over(self, row: int, until_locked: bool) -> bool:
+        """Whether the drive ends after this row."""
+        return until_locked and row >= LOCK_ROWS and lock_row(np.concatenate(self._errors)[self._base :]) is not None
 
     def _read(self) -> None:
         """Lets the filter take the rows that were driven since the last time."""
@@ -220,10 +233,14 @@ class Loop:
             return
         rows = self._observations()
         table, _ = self._filter.replay(rows, self._fed, done - self._fed)
-        truth = rows.truth[self._fed : done]
+        self._take(rows, self._fed, table)
+        self._fed = done
+
+    def _take(self, rows: Observations, first: int, table: np.ndarray) -> None:
+        """Rows from `first` on were read, and gave `table`, (n,) of ESTIMATE."""
+        truth = rows.truth[first : first + len(table)]
         self._errors.append(position_errors(table["pose"], truth))
         self._truth.append(truth)
-        self._fed = done
 
     def _observations(self) -> Observations:
         """All rows of this drive; those after the present one are of standing still. A row's readings depend on nothing later."""

@@ -12,7 +12,10 @@ from .states import EXPLORE_M_S
 
 
 class Choices(Protocol):
-    """Asked by the behaviour `b` at a tick; `b` is read only."""
+    """Asked by the behaviour `b` at a tick; `b` is read only. `remembers`: it keeps away from what it met by itself, so that the
+    behaviour escapes from nothing."""
+
+    remembers: bool
 
     def on(self, b: Any, tick: int) -> float:
         """At the end of a drive: how far to go on as now, m; 0: a turn comes first. May be asked more than once at a tick."""
@@ -34,6 +37,8 @@ class Choices(Protocol):
 
 class Random:
     """Random exploration: a drive of 3 to 8 s, then a turn to either side; every contact is whisked at."""
+
+    remembers = False
 
     def __init__(self, rng: np.random.Generator):
         self._rng = rng

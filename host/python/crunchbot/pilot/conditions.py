@@ -62,7 +62,7 @@ def touched_and_may_turn_round(b, tick: int) -> bool:
 
 def crowded(b, tick: int) -> bool:
     """Whether the robot has met something here before, too often or for too long."""
-    if not b.habits.escapes:
+    if not b.habits.escapes or b.choices.remembers:
         return False
     here = len(b.whereabouts.encounters(tick - CROWD_TICKS, CROWD_M))
     return here >= CROWD or (here > 0 and lingering(b, tick))

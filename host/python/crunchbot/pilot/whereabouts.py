@@ -61,6 +61,10 @@ class Whereabouts:
         """(m, 2) places of what was met, in the robot's frame, m."""
         return self._from_here(np.array([(m.thing_x_m, m.thing_y_m) for m in self._met]).reshape(-1, 2))
 
+    def places(self) -> np.ndarray:
+        """(m, 2) where the robot was as it met each of them, likewise."""
+        return self._from_here(np.array([(m.x_m, m.y_m) for m in self._met]).reshape(-1, 2))
+
     def been(self) -> np.ndarray:
         """(n, 3) poses in which the robot was at its reports, in its present frame: m, m, rad."""
         path = np.array(self._path).reshape(-1, 4)

@@ -12,6 +12,8 @@ class Along:
     """Follows what it meets: out by OUT_RAD, HUG_M along it, in by IN_RAD until it is met again. It keeps the wall to its right;
     every contact is whisked at."""
 
+    remembers = False
+
     def __init__(self) -> None:
         self._met = False
 
@@ -35,6 +37,8 @@ class Along:
 
 class Lanes:
     """Boustrophedon: straight on until something is met, a quarter turn, LANE_M, a quarter turn to the same side, and back."""
+
+    remembers = False
 
     def __init__(self) -> None:
         self._side, self._across = 1.0, False

@@ -16,6 +16,8 @@ Truth = Callable[[], np.ndarray]  # (3,) the true pose, for a policy that may kn
 class Planned:
     """What a planner says; where it has nothing to say, or no belief has come yet, what `otherwise` says."""
 
+    remembers = False
+
     def __init__(self, planner: Planner, belief: Belief, otherwise: Choices, truth: Truth | None = None):
         self._planner, self._belief, self._otherwise, self._truth = planner, belief, otherwise, truth
         self.plan = Plan()

@@ -17,7 +17,7 @@ from ..nav.filters import COMPONENT
 from ..nav.mapper import PATCH_M, Mapper, TouchMap
 from ..nav.mapping import left_by, textures_in, write_map
 from ..nav.observations import Observations, joined
-from ..observation import NORMAL, Quantity, Row, has_normals
+from ..observation import has_normals
 from ..scene import Arena, Robot, Scene
 from .journal import Journal
 from .network import belief, messages
@@ -28,7 +28,8 @@ from .network.messages import Header, Localisation, Observation, PoseWithCovaria
 from .network.ranges import LOOPS_MOST
 from .network.ros import MAP_FRAME, MapMetaData, OccupancyGrid, Pose
 from .network.row_checks import RowChecks
-from .network.rows import Follower, Step, time_text
+from .network.rows import Follower, Step
+from .observed import observed
 
 NAME = "mapper"  # of the process, and of the filter in its answers
 MAP_NS, BELIEF_NS = 1_000_000_000, 500_000_000  # of the bridge's clock, between two maps and two beliefs
@@ -150,7 +151,7 @@ class MapperProcess:
         if self._mapper is None:
             normals = has_normals(step.row.names)
             self._mapper = Mapper(self._robot, self._scene.arena.textures, self._settings.seed, normals=normals)
-        taken = joined([_observed(row, self._scene) for row in rows])
+        taken = joined([observed(row, self._scene) for row in rows])
         table, step_us = self._mapper.replay(taken, 0, len(taken))
         self._rows.append(taken)
         self._tables.append(table)
@@ -209,16 +210,6 @@ def _component(estimate: np.ndarray) -> np.ndarray:
     out["sigma_m"] = math.sqrt(max((covariance[0, 0] + covariance[1, 1]) / 2, 0.0))
     out["sigma_rad"] = math.sqrt(max(covariance[2, 2], 0.0))
     return out
-
-
-def _observed(row: Row, scene: Scene) -> Observations:
-    """A row as Observations of one."""
-    tips, rays, layout = len(scene.robot.of_role("texture")), len(scene.robot.of_role("object")), scene.layout
-    texture = row.read(layout.of(Quantity.TEXTURE)).reshape(1, tips, len(scene.arena.textures))
-    radial = row.read(layout.of(Quantity.DISTANCE), empty=math.inf).reshape(1, rays) / 1000.0
-    normal = row.find(layout.of(Quantity.NORMAL)).reshape(1, rays, len(NORMAL))
-    motion = np.asarray(row.motion, np.float64)[None]
-    return Observations(np.array([row.t_s]), [time_text(row)], motion, texture, radial, None, None, normal)
 
 
 def to_grid(header: Header, touched: TouchMap) -> OccupancyGrid:

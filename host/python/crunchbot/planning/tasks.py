@@ -1,0 +1,225 @@
+"""Tasks in the place of the pilot's random choices: `Mapping` visits what was not visited, `Checking` reads one tile."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..pilot.choices import Choices
+from ..pilot.conditions import touching
+from ..pilot.states import ODOMETRY_TICKS, TICK_S
+from ..pilot.whereabouts import AHEAD_M, ASIDE_RAD
+from ..scene import Robot
+from .actions import Vehicle
+from .choices import STRAIGHT_ON_RAD
+from .coverage import NO_WAY, NOTHING_NEW, CoveragePlanner, Growing, Way, closed_at, lanes, of_growing, of_known
+from .ground import Ground
+from .tiles import Tile, Tiles, is_placed
+
+STRAIGHT_RAD, STRAIGHT_M = (
+    math.radians(5.0),
+    0.035,
+)  # a smaller turn, or one that leads no further aside, is not worth a stop
+DRIVE_M = 0.4  # before it is planned anew, without a stop
+ESCAPED_M = 0.3  # of a drive after an escape
+SOLID, FELT_M = (
+    0.9,
+    0.1,
+)  # a cell that is solid for sure; from something solid in the map: it is the same, and no whisk says more
+REST_TICKS = round(1.0 / TICK_S)  # before it is planned anew where nothing is worth its time
+Pose = Callable[[], np.ndarray | None]  # (3,) of this moment in the map's frame; None: not known yet
+Estimate = Callable[[], tuple[np.ndarray, np.ndarray, float] | None]  # of it with covariance (3, 3) and confidence
+READ_LEAST_M2 = 1e-6  # of the tile on one way: any
+NO_WHISKERS = "no whisker reads anything"
+NOT_REACHABLE, NOTHING_SUSPECTED = "not reachable", "no tile is suspected"
+
+
+class Driver:
+    """Turns and drives along a way that `_plan` gives; where no pose is known, or no new floor is in reach, what `otherwise` says.
+    Where it is refused for another reason the robot stands, and is asked again."""
+
+    remembers = True
+
+    def __init__(self, otherwise: Choices):
+        self._otherwise = otherwise
+        self.way = Way(NO_WAY)
+        self.plans = 0
+        self._tick, self._first = -REST_TICKS, (0.0, 0.0)
+
+    def _plan(self, b: Any, tick: int) -> tuple[Way, np.ndarray] | None:
+        """The way, and the pose from which it leads; None: nothing is known yet."""
+        raise NotImplementedError
+
+    def on(self, b: Any, tick: int) -> float:
+        """As in pilot.choices.Choices."""
+        turn, drive = self._renewed(b, tick) or (0.0, 0.0)
+        return drive if turn == 0.0 else 0.0
+
+    def turn(self, b: Any, tick: int, least_deg: float, most_deg: float) -> float:
+        """As in pilot.choices.Choices."""
+        first = self._renewed(b, tick)
+        if first is None:
+            return self._otherwise.turn(b, tick, least_deg, most_deg)
+        turn, drive = first
+        return (turn or STRAIGHT_ON_RAD) if drive > 0.0 else 0.0
+
+    def distance(self, b: Any, tick: int) -> float:
+        """As in pilot.choices.Choices; none where no turn was asked for before, so that one is asked for at once."""
+        if tick == b.turned_away:
+            return ESCAPED_M
+        first, self._first = self._first, (0.0, 0.0)
+        return self._otherwise.distance(b, tick) if first is None else first[1]
+
+    def whisk(self, b: Any, tick: int) -> bool:
+        """As in pilot.choices.Choices."""
+        return self._otherwise.whisk(b, tick)
+
+    def _renewed(self, b: Any, tick: int) -> tuple[float, float] | None:
+        """The first turn and drive of this tick's way; none to drive: it rests."""
+        rests = self.way.refused and tick - self._tick < REST_TICKS
+        if tick != self._tick and not rests:
+            planned, self._tick = self._plan(b, tick), tick
+            self.plans += planned is not None
+            self.way, self._first = Way(NO_WAY), None
+            if planned is not None:
+                self.way, pose = planned
+            if planned is not None and self.way.refused != NOTHING_NEW:
+                self._first = _leg(self.way, pose)
+        return self._first
+
+
+def _leg(way: Way, pose: np.ndarray) -> tuple[float, float]:
+    """Turn, rad, and drive, m, of what a robot at pose (3,) does next on a way."""
+    turn, drive = way.first(pose) if len(way.corners) else (0.0, 0.0)
+    aside = drive * abs(math.sin(turn)) if abs(turn) < math.pi / 2.0 else math.inf
+    straight = abs(turn) < STRAIGHT_RAD or aside < STRAIGHT_M
+    return 0.0 if straight else turn, min(drive, DRIVE_M)
+
+
+class Mapping(Driver):
+    """Drives where most new floor is swept a second, on its own map and its own pose in it."""
+
+    def __init__(self, robot: Robot, vehicle: Vehicle, pose: Pose, known: Callable[[], Growing], otherwise: Choices):
+        super().__init__(otherwise)
+        self._robot, self._pose, self._known = robot, pose, known
+        self._planner = CoveragePlanner(vehicle, lanes(robot))
+        self._frame, self._seen = -1, -1  # `_seen`: tick up to which it is known where it was
+        self._forget()
+
+    def _forget(self) -> None:
+        self._been: list[np.ndarray] = []
+        self._met: list[np.ndarray] = []
+
+    def whisk(self, b: Any, tick: int) -> bool:
+        """As in pilot.choices.Choices: at what the map does not have yet."""
+        pose, grid = self._pose(), self._known().grid
+        if pose is None or grid is None or not grid.occupied.size:
+            return True
+        bearing = pose[2] + ASIDE_RAD * b.sides.get(touching(b)[0], 0.0)
+        row, column = np.nonzero(grid.occupied > SOLID)
+        x, y = grid.x + (column + 0.5) * grid.cell - pose[0], grid.y + (row + 0.5) * grid.cell - pose[1]
+        off = np.hypot(x - AHEAD_M * math.cos(bearing), y - AHEAD_M * math.sin(bearing))
+        return not (off < FELT_M).any()
+
+    def _plan(self, b: Any, tick: int) -> tuple[Way, np.ndarray] | None:
+        pose = self._pose()
+        if pose is None:
+            return None
+        if not self._robot.whiskers:
+            return Way(NO_WAY, refused=NO_WHISKERS), pose
+        known = self._known()
+        if known.frame != self._frame:
+            self._frame = known.frame
+            self._forget()
+        self._remember(b, tick, pose)
+        return self.planned(pose, known)
+
+    def planned(self, pose: np.ndarray, known: Growing) -> tuple[Way, np.ndarray]:
+        """The way from pose (3,) over this map, and the pose in the way's frame."""
+        field, here = of_growing(known, np.concatenate(self._been), np.concatenate(self._met), pose, self._robot)
+        return self._planner.plan(field, here), here
+
+    def _remember(self, b: Any, tick: int, pose: np.ndarray) -> None:
+        """Where it was and what it met since it was last asked."""
+        rows = 1 + (tick - self._seen) // ODOMETRY_TICKS
+        met = len(b.whereabouts.encounters(self._seen, math.inf))
+        self._been.append(_placed(pose, b.whereabouts.been()[-rows:, :2]))
+        self._met.append(_met(pose, b, len(b.whereabouts.things()) - met))
+        self._seen = tick
+
+
+class Checking(Driver):
+    """Reads one tile of a known arena until its texture is known: `result` says what was found, empty until then. Where the
+    robot is must be known first: until then `otherwise` drives."""
+
+    def __init__(
+        self,
+        ground: Ground,
+        vehicle: Vehicle,
+        tiles: Tiles,
+        estimate: Estimate,
+        otherwise: Choices,
+        tile: Tile | None = None,
+    ):
+        """`tile`: None: the one that the windows so far say most against. ValueError when there is no such tile."""
+        super().__init__(otherwise)
+        rows, columns = tiles.mapped.shape
+        if tile is not None and not (0 <= tile[0] < columns and 0 <= tile[1] < rows):
+            raise ValueError(f"tile {tile[0]},{tile[1]}: outside the floor's {columns} x {rows}; give one inside")
+        self._ground, self._tiles, self._estimate, self.tile = ground, tiles, estimate, tile
+        asides = np.array([whisker.tip_m[1] for whisker in ground.robot.of_role("texture")])
+        self._planner = CoveragePlanner(vehicle, asides, READ_LEAST_M2)
+        self.result = ""
+
+    def look(self) -> str:
+        """The result, after the rows that `tiles` has taken so far."""
+        if self.tile is not None and not self.result:
+            found = self._tiles.known(self.tile)
+            mapped = self._tiles.mapped[self.tile[1], self.tile[0]]
+            if found is not None:
+                self.result = "as mapped" if found == mapped else f"otherwise: {self._tiles.textures[found]}"
+        return self.result
+
+    def whisk(self, b: Any, tick: int) -> bool:
+        """As in pilot.choices.Choices: not once it is known where it is."""
+        return self._placed() is None and super().whisk(b, tick)
+
+    def _placed(self) -> np.ndarray | None:
+        found = self._estimate()
+        return found[0] if found is not None and is_placed(*found[1:]) else None
+
+    def _plan(self, b: Any, tick: int) -> tuple[Way, np.ndarray] | None:
+        pose = self._placed()
+        if pose is None and not self.result:
+            return None
+        self.tile = self.tile or self._tiles.suspected()
+        if self.look() or self.tile is None:
+            return Way(NO_WAY, refused=self.result or NOTHING_SUSPECTED), np.zeros(3)
+        field = closed_at(of_known(self._ground, self._wanted()), _met(pose, b, 0), pose, self._ground)
+        way = self._planner.plan(field, pose)
+        if way.refused:
+            self.result = NOT_REACHABLE
+            return Way(NO_WAY, refused=self.result), pose
+        return way, pose
+
+    def _wanted(self) -> np.ndarray:
+        """Cells of the ground that are of the tile, and free."""
+        edge, out = self._tiles.edge_m, np.zeros(self._ground.texture.shape, bool)
+        column, row = (
+            slice(*(int((edge * (n + k) - self._ground.corner_m) / self._ground.cell_m) for k in (0, 1)))
+            for n in self.tile
+        )
+        out[row, column] = self._ground.clear_m[row, column] > 0.0
+        return out
+
+
+def _placed(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(n, 2) points of the robot's frame in the map's."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    return points @ np.array([[c, s], [-s, c]]) + pose[:2]
+
+
+def _met(pose: np.ndarray, b: Any, first: int) -> np.ndarray:
+    """(m, 4) what the behaviour met, from number `first` on, and where the robot was then, in the map's frame."""
+    return np.column_stack([_placed(pose, at[first:]) for at in (b.whereabouts.things(), b.whereabouts.places())])
