@@ -6,7 +6,7 @@ driven on, and may stop the robot.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -20,7 +20,7 @@ CELL_M = 0.05
 BUDGET = 30_000  # states
 MARGIN_M = 0.6  # of ground around what is known
 BEEN_M = 0.05  # from where the robot's middle was: nothing stood there
-SPARE_M, WRONG_M = 0.03, 0.085  # by which a map is often wrong, and by which it is never
+SPARE_M, WRONG_M = 0.03, 0.085  # by which a map of one's own is often wrong, and by which it is never
 # In a step of a cell: on ground that nobody knows; where the body would fit if the map were wrong; where it
 # hardly fits; where whiskers would touch.
 UNKNOWN, TIGHT, CLOSE, TOUCHED = math.exp(-CELL_M / 1.0), 0.5, 0.85, 0.97
@@ -271,23 +271,28 @@ def _near(open_: np.ndarray, here: np.ndarray, low: np.ndarray) -> np.ndarray:
     return (x - here[0]) ** 2 + (y - here[1]) ** 2 < LEAVE_M**2
 
 
-def of_known(ground: Ground, fresh: np.ndarray) -> Field:
-    """What a known ground says, where `fresh` (rows, columns of the ground) bool is to be read; its cells are as coarse as CELL_M."""
-    by = max(1, round(CELL_M / ground.cell_m))
+def of_known(ground: Ground, fresh: np.ndarray, met: np.ndarray, pose: np.ndarray) -> Field:
+    """What a known ground says to a robot at pose (3,), where `fresh` (rows, columns of the ground) bool is to be read; its cells are
+    about CELL_M wide. Of what was met, `met` as of `of_growing`, what the ground has already is no news."""
+    by, low = max(1, round(CELL_M / ground.cell_m)), np.full(2, ground.corner_m)
     rows, columns = (side // by * by for side in ground.clear_m.shape)
 
     def blocks(cells: np.ndarray) -> np.ndarray:
         return cells[:rows, :columns].reshape(rows // by, by, columns // by, by)
 
-    clear = blocks(ground.clear_m).mean(axis=(1, 3))
-    open_ = np.where(clear < ground.robot.body_radius_m, 0.0, _passed(clear, ground.robot)).astype(np.float32)
+    clear = blocks(ground.clear_m).min(axis=(1, 3))
+    open_ = np.where(clear < reach(ground.robot), TOUCHED, 1.0)
+    fits = clear >= ground.robot.body_radius_m
+    away = _near(open_, pose, low) & (clear >= _at(ground, pose[None, :2])[0])  # it stands there, so it gets away
+    np.putmask(open_, ~(fits | away), 0.0)
+    bars = met[:, 2:] + STOPPED_M * _directions(met[:, 2:], met[:, :2])
+    _close_at(open_, bars[_at(ground, bars) > reach(ground.robot)], low)
     wanted = blocks(fresh).mean(axis=(1, 3)) > 0.5
-    return Field(by * ground.cell_m, ground.corner_m, ground.corner_m, open_, wanted.astype(np.uint8))
+    return Field(by * ground.cell_m, *map(float, low), open_.astype(np.float32), wanted.astype(np.uint8))
 
 
-def closed_at(field: Field, met: np.ndarray, pose: np.ndarray, ground: Ground) -> Field:
-    """A field where something was met, `met` as of `of_growing`, for a robot at pose (3,), which gets away from there."""
-    open_, low = field.open.astype(float), np.array([field.x_m, field.y_m])
-    np.putmask(open_, _near(open_, pose, low), np.maximum(open_, CLOSE))
-    _close_at(open_, met[:, 2:] + STOPPED_M * _directions(met[:, 2:], met[:, :2]), low)
-    return replace(field, open=open_.astype(np.float32))
+def _at(ground: Ground, points: np.ndarray) -> np.ndarray:
+    """(n,) clearance at points (n, 2)."""
+    most = np.array(ground.clear_m.shape[::-1]) - 1
+    column, row = np.clip((points - ground.corner_m) / ground.cell_m, 0, most).astype(int).T
+    return ground.clear_m[row, column]

@@ -13,7 +13,7 @@ from ..pilot.whereabouts import AHEAD_M, ASIDE_RAD
 from ..scene import Robot
 from .actions import Vehicle
 from .choices import STRAIGHT_ON_RAD
-from .coverage import NO_WAY, NOTHING_NEW, CoveragePlanner, Growing, Way, closed_at, lanes, of_growing, of_known
+from .coverage import NO_WAY, NOTHING_NEW, CoveragePlanner, Growing, Way, lanes, of_growing, of_known
 from .ground import Ground
 from .tiles import Tile, Tiles, is_placed
 
@@ -196,7 +196,7 @@ class Checking(Driver):
         self.tile = self.tile or self._tiles.suspected()
         if self.look() or self.tile is None:
             return Way(NO_WAY, refused=self.result or NOTHING_SUSPECTED), np.zeros(3)
-        field = closed_at(of_known(self._ground, self._wanted()), _met(pose, b, 0), pose, self._ground)
+        field = of_known(self._ground, self._wanted(), _met(pose, b, 0), pose)
         way = self._planner.plan(field, pose)
         if way.refused:
             self.result = NOT_REACHABLE

@@ -164,6 +164,8 @@ def set_down():
 class Chosen:
     """Choices that are given: how far the first drive goes on, a turn, and whether to whisk; a second turn is left."""
 
+    remembers = False
+
     def __init__(self, turn=0.5, whisk=False, on=0.0):
         self.turns, self.worth, self.further = [turn], whisk, on
         self.asked = None  # tick at which it was first asked whether to go on

@@ -1,5 +1,5 @@
 """Ways to new floor over maps as they grow, and what windows say of a tile. The search's arithmetic is
-host/nav/tests/test_coverage.c's; closed loops are lab/tests/scenes/test_tasks.py's."""
+host/nav/tests/test_coverage.c's; closed loops are lab/tests/scenes/test_closed_tasks.py's."""
 
 import math
 from types import SimpleNamespace
@@ -130,7 +130,7 @@ def test_plans_do_not_depend_on_the_frame(axes):
 
 def test_a_known_ground_is_open_where_the_body_fits():
     ground = Ground.of(ArenaMap(FLOOR), ROBOT)
-    field = of_known(ground, np.ones(ground.texture.shape, bool))
+    field = of_known(ground, np.ones(ground.texture.shape, bool), NEVER, np.array([0.5, 0.5, 0.0]))
     assert opened(field, 0.5, 0.5) == 1.0
     assert opened(field, 0.1, 0.5) == opened(field, 1.25, 1.25) == opened(field, 0.9, 1.25) == 0.0
     assert field.fresh.all()
