@@ -241,7 +241,6 @@ STUDIES = {  # page, what it holds
     "results/map_representations.md": "maps of faces, grids in particles, a factor graph: error against cost",
     "results/nav_size.md": "a start unknown, by the size of the arena",
     "results/nav_active.md": "where to touch next: a planner beside random exploration, in closed loop",
-    "results/nav_tasks.md": "an arena to be mapped in 5 minutes, and a tile to be checked, in closed loop",
     "results/nav_normals.md": "what the direction of a touched surface is worth",
     "results/nav_paper.md": "the paper's navigation figures, repeated",
     "results/texture.md": "floor texture: faults, recordings, peers",

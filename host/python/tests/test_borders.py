@@ -24,6 +24,7 @@ from crunchbot.nav.map_choice import evidence_of
 from crunchbot.nav.mapper import Mapper
 from crunchbot.nav.weigher import Weigher
 from crunchbot.planning.actions import Vehicle
+from crunchbot.planning.coverage import CoveragePlanner, Field
 from crunchbot.planning.ground import ArenaMap, Ground
 from crunchbot.planning.planner import Past, Planner
 from crunchbot.touch.contact import Contact
@@ -95,6 +96,7 @@ PLAIN = TextureModel.train({"A": [NOISE], "B": [3.0 * NOISE]})
 WHISK = {"t_s": np.arange(64.0), "samples": NOISE[:64], "whisk_rad_s": np.ones(64), "reported_rad_s": np.ones(64)}
 PUSH = {"bases": np.zeros((8, 3)), "tilts": np.zeros((8, 2)), "good": np.ones(8, bool)}
 GROUND, VEHICLE = Ground.of(ArenaMap(SCENE.arena), SCENE.robot), Vehicle(0.15, 0.71, 0.5, 4.0, 0.25)
+FIELD = Field(0.1, 0.0, 0.0, np.ones((5, 6), np.float32), np.ones((5, 6), np.uint8))
 PAST = {"met": np.zeros((2, 2)), "been": np.zeros((3, 3))}
 BLOCK = {"ticks": np.arange(8), "samples": NOISE[:8], "good": np.ones(8, bool)}
 
@@ -129,6 +131,16 @@ CASES = {
         {"odometry": (0,), "texture": (0, 1), "radial_m": (0,)},
     ),
     "nav.weigher.Weigher.weigh": of_one(Weigher(SCENE).weigh, "poses", np.zeros((4, 3)), 1),
+    "planning.coverage.CoveragePlanner.plan": Case(
+        lambda **cells: CoveragePlanner(VEHICLE, np.zeros(1)).plan(Field(0.1, 0.0, 0.0, **cells), np.ones(3)),
+        {"open": np.ones((5, 6), np.float32), "fresh": np.ones((5, 6), np.uint8)},
+        {"open": (), "fresh": (0, 1)},
+    ),
+    "planning.coverage.CoveragePlanner._make": Case(
+        lambda **asides: CoveragePlanner(VEHICLE, **asides).plan(FIELD, np.ones(3)),
+        {"asides_m": np.zeros(3)},
+        {"asides_m": ()},
+    ),
     "planning.planner._ground": Case(
         lambda **cells: Planner(dataclasses.replace(GROUND, **cells), VEHICLE),
         {"texture": GROUND.texture, "clear_m": GROUND.clear_m},
