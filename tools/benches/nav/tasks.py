@@ -21,8 +21,7 @@ from crunchbot_lab.scenes.closed import Loop
 from crunchbot_lab.scenes.families import Recipe, recipe
 from crunchbot_lab.scenes.making import ROW_S
 from crunchbot_lab.scenes.sweep import sweep
-from crunchbot_lab.scenes.tasks import CheckLoop, MapLoop, mapping
-from crunchbot_lab.scenes.visits import reachable
+from crunchbot_lab.scenes.tasks import CheckLoop, MapLoop, mapping, reachable
 
 from .. import store
 from .active import ATOM_HZ, REPEATS
