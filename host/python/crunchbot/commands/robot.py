@@ -182,6 +182,6 @@ def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Sim
         with bar(total=models_wanted, desc="models", unit="model", disable=None) as done:
             result = kept.learn_or_copy(models, scene, seed, lambda: done.update(1))
         print(f"models: {result}", flush=True)
-    body = parts.Body(folder, models, arguments.create, meeting.serial, seed, arguments.choose)
+    body = parts.Body(folder, models, arguments.create, meeting.serial, seed, _choice(arguments))
     reported = (arguments.level, seed, arguments.seconds, arguments.pace, out / "truth.csv", out / "wheels.csv")
     return body, parts.Simulated(out / "scene.flat", *reported)
