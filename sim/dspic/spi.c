@@ -128,7 +128,7 @@ static void dspic_spi_shift_word(struct dspic *chip, unsigned n, uint16_t in)
     struct spi *s = &chip->spi[n];
     const unsigned bits = dspic_spi_width(chip, n);
     s->in = in;
-    s->sdo = s->out >> (16u - bits) & 1u;
+    s->sdo = (unsigned)s->out >> (16u - bits) & 1u;
     s->out = (uint16_t)((uint32_t)s->out << bits);
     s->bit = (uint8_t)bits;
     pins_of_spi(chip, n);
