@@ -313,8 +313,9 @@ static uint16_t sim_node_word_by_edges(sim_node *node, uint16_t sent)
 {
     uint16_t answer = 0;
     for (unsigned i = WORD_BITS; i-- > 0;) {
-        answer = (uint16_t)(answer << 1 | sim_node_sck(node, true, sent >> i & 1u));
-        (void)sim_node_sck(node, false, sent >> i & 1u);
+        const bool bit = ((unsigned)sent >> i & 1u) != 0u;
+        answer = (uint16_t)(answer << 1 | sim_node_sck(node, true, bit));
+        (void)sim_node_sck(node, false, bit);
     }
     return answer;
 }

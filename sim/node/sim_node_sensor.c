@@ -104,7 +104,8 @@ uint16_t sim_node_sensor_byte_ends(void *context, const struct dspic_word *word)
         const bool rises = edge % 2u == 0;
         at_fs += word->half_fs;
         const bool seen = sim_node_sensor_edge(node, rises, true, at_fs / DSPIC_FS_PER_NS);
-        in = rises ? in : (uint16_t)(in << 1 | seen);
+        if (!rises)
+            in = (uint16_t)(in << 1 | seen);
     }
     dspic_wire(node->chip, PIN_SENSOR_DATA, in & 1u);
     return in;

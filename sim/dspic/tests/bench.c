@@ -69,7 +69,9 @@ static uint16_t on_word_ends(void *context, const struct dspic_word *word)
     struct bench *b = context;
     b->words++;
     b->sent = b->sent << word->bits | word->sent;
-    return b->line ? (uint16_t)(0xFFFFu >> (16u - word->bits)) : 0u;
+    if (!b->line)
+        return 0u;
+    return (uint16_t)(0xFFFFu >> (16u - word->bits));
 }
 
 struct dspic_parameters standard(void)
