@@ -1,4 +1,4 @@
-"""Tasks in closed loop, as rates over seeds: tiles visited of an arena that nobody knows, beside random; a tile that is checked."""
+"""Tasks in closed loop, as rates over seeds: tiles visited of an arena that is unknown, beside random; a tile that is checked."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def shares(family, policy):
 
 
 def test_a_task_visits_more_than_chance():
-    """Measured in 2 minutes, seeds 500 to 505: see docs/results/nav_tasks.md for 5 minutes of others."""
+    """In 2 minutes; `tools/benches nav_tasks` measures 5."""
     by_task, by_chance = (np.mean(shares("robot", policy)) for policy in (mapping, as_it_is))
     assert by_task > 0.6 and by_task > by_chance + 0.05
 

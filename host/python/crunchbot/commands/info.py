@@ -19,9 +19,8 @@ from ..programs import program
 
 EXAMPLE = "whisker info --json"
 ANSWER_S = 10.0  # whiskerd asks its nodes within 200 ticks
-ANSWER_TICKS = round(
-    ANSWER_S * LIMITS["clock_hz"] / LIMITS["tick_period"]
-)  # a simulated bridge may be slower than life
+# The same in the bridge's frames: a simulated bridge may be slower than real time.
+ANSWER_TICKS = round(ANSWER_S * LIMITS["clock_hz"] / LIMITS["tick_period"])
 TEST_ID_TEXT = "{:04x}:{:04x}".format(*usbtree.TEST_ID)
 
 

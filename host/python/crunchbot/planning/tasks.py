@@ -17,16 +17,12 @@ from .coverage import NO_WAY, NOTHING_NEW, CoveragePlanner, Growing, Way, lanes,
 from .ground import Ground
 from .tiles import Tile, Tiles, is_placed
 
-STRAIGHT_RAD, STRAIGHT_M = (
-    math.radians(5.0),
-    0.035,
-)  # a smaller turn, or one that leads no further aside, is not worth a stop
+# A smaller turn, or one that leads no further aside, is not worth a stop.
+STRAIGHT_RAD, STRAIGHT_M = math.radians(5.0), 0.035
 DRIVE_M = 0.4  # before it is planned anew, without a stop
 ESCAPED_M = 0.3  # of a drive after an escape
-SOLID, FELT_M = (
-    0.9,
-    0.1,
-)  # a cell that is solid for sure; from something solid in the map: it is the same, and no whisk says more
+SOLID = 0.9  # probability from which a cell is taken for solid
+FELT_M = 0.1  # a contact this near to something solid in the map is of it, and another whisk there gives nothing new
 REST_TICKS = round(1.0 / TICK_S)  # before it is planned anew where nothing is worth its time
 Pose = Callable[[], np.ndarray | None]  # (3,) of this moment in the map's frame; None: not known yet
 Estimate = Callable[[], tuple[np.ndarray, np.ndarray, float] | None]  # of it with covariance (3, 3) and confidence

@@ -1,7 +1,7 @@
 """What texture windows say of each tile of a known floor, against what the map says of it.
 
-A window counts where the pose is known so well that its tip is on that tile alone: ground that is known tells where the robot is,
-and the tile has no say in it but once it was left.
+A window counts where the pose is known so well that its tip is on that tile alone. So the known ground around the tile
+fixes the pose, not the tile itself.
 """
 
 import math
@@ -16,11 +16,8 @@ WRONG = 0.15  # of windows that say one texture, on top of what they say themsel
 AS_MAPPED = 0.5  # prior of a tile that is suspected
 SURE = 0.999  # probability from which a tile's texture is known
 WINDOWS_LEAST = 10  # a run of windows that are wrong together is shorter
-PLACED, SPREAD_M, SIGMAS = (
-    0.9,
-    0.1,
-    2.0,
-)  # confidence and spread of a pose that counts; a tip is so many sigmas within its tile
+PLACED, SPREAD_M = 0.9, 0.1  # confidence and standard deviation of a pose whose windows count
+SIGMAS = 2.0  # standard deviations by which a tip is within its tile
 
 
 class Tiles:

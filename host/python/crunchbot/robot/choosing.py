@@ -28,7 +28,7 @@ def tile(text: str) -> tuple[int, int]:
 
 
 def refuse_tile(arguments: argparse.Namespace) -> None:
-    """UserError where a tile is given to nobody."""
+    """UserError where a tile is given and no task checks one."""
     if arguments.tile is not None and arguments.choose != CHECK:
         column, row = arguments.tile
         raise UserError(f"--tile {column},{row}: only --choose {CHECK} looks at a tile; give that, or no --tile")

@@ -35,7 +35,7 @@ WHISK_S, SETTLE_S = 4.0, 0.25  # of the behaviour's body whisk with its way back
 
 
 class RowTaker(Protocol):
-    """What is to know of every row that is sent: number `seq`, and motion summed up to it, `pose` (3,), m, m, rad."""
+    """Takes every row that is sent: its number `seq`, and the motion summed up to it, `pose` (3,), m, m, rad."""
 
     def row(self, seq: int, pose: np.ndarray, row: Row) -> None: ...
 
@@ -77,7 +77,7 @@ def _moved(poses: np.ndarray, then: np.ndarray, now: np.ndarray) -> np.ndarray:
 
 
 class OwnMap:
-    """The pilot's own mapper: it needs nobody, and the same rows give the same map on any machine."""
+    """The pilot's own mapper: no other process is needed, and the same rows give the same map on any machine."""
 
     def __init__(self, robot: Robot, seed: int):
         self._robot, self._seed = replace(robot, sensors=()), seed
@@ -141,7 +141,9 @@ def taker_of(name: str, scene: Scene, link: Link, seed: int) -> RowTaker | None:
     """What the choices of this name need to know of the rows; None: nothing."""
     if name == MAP:
         return OwnMap(scene.robot, seed)
-    return {PLAN: FollowedBelief, CHECK: lambda link: FollowedTiles(link, scene)}.get(name, lambda link: None)(link)
+    if name == CHECK:
+        return FollowedTiles(link, scene)
+    return FollowedBelief(link) if name == PLAN else None
 
 
 def choices_of(name: str, scene: Scene, taker: Any, random: Choices, tile: Tile | None = None) -> Choices:
