@@ -241,6 +241,7 @@ STUDIES = {  # page, what it holds
     "results/map_representations.md": "maps of faces, grids in particles, a factor graph: error against cost",
     "results/nav_size.md": "a start unknown, by the size of the arena",
     "results/nav_active.md": "where to touch next: a planner beside random exploration, in closed loop",
+    "results/nav_tasks.md": "a robot that maps an unknown arena, and one that checks a tile, in closed loop",
     "results/nav_normals.md": "what the direction of a touched surface is worth",
     "results/nav_paper.md": "the paper's navigation figures, repeated",
     "results/texture.md": "floor texture: faults, recordings, peers",

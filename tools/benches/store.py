@@ -57,6 +57,7 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tools/benches nav_paper": (("nav_paper",), ("nav_banana", "nav_fig6a", "nav_fig6b", "nav_fig6c")),
     "tools/benches nav_peers": (("nav_peers",), ()),
     "tools/benches nav_size": (("nav_size",), ("nav_size",)),
+    "tools/benches nav_tasks": (("nav_tasks",), ("nav_tasks",)),
     "tools/benches nav_unseen": (("nav_unseen",), ()),
     "tools/benches nav_unseen --leave": (("nav_left_out",), ()),
     "tools/benches node": (("node", "node_cuts", "node_faults"), ("node_age", "node_link", "node_skew")),

@@ -199,7 +199,7 @@ def every() -> float:
     return seconds / plans
 
 
-def run(_build: Path, seeds: int = 30, workers: int = 1) -> None:
+def run(_build: Path, seeds: int = 30, workers: int | None = None) -> None:
     """Measures what is not kept, and writes result, chart and page."""
     jobs = {
         f"{family}_{policy}_{seed}": {"family": family, "policy": policy, "seed": FIRST_SEED + seed}
@@ -208,7 +208,7 @@ def run(_build: Path, seeds: int = 30, workers: int = 1) -> None:
         for policy in POLICIES
     }
     folder = store.kept("nav_active", *INPUTS)
-    found = sweep(one, jobs, folder, workers, "processes" if workers > 1 else "serial", "nav_active")
+    found = sweep(one, jobs, folder, workers, label="nav_active")
     by = {f: {p: [found[f"{f}_{p}_{s}"] for s in range(seeds)] for p in POLICIES} for f in FAMILIES}
     families = {f: {p: judged(runs, of["random"]) for p, runs in of.items()} for f, of in by.items()}
     refuse_below_bound(families)
@@ -225,4 +225,4 @@ def run(_build: Path, seeds: int = 30, workers: int = 1) -> None:
 
 def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seeds", type=int, default=30, help="of each family (default: %(default)s)")
-    parser.add_argument("--workers", type=int, default=1, help="processes (default: %(default)s)")
+    parser.add_argument("--workers", type=int, help="processes (default: all cores)")

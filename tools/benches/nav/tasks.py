@@ -207,7 +207,7 @@ def page(data: dict) -> str:
     return "\n".join(lines) + "\n"
 
 
-def run(_build: Path, seeds: int = 15, workers: int = 1) -> None:
+def run(_build: Path, seeds: int = 15, workers: int | None = None) -> None:
     """Measures what is not kept, and writes result, chart and page."""
     of = range(FIRST_SEED, FIRST_SEED + seeds)
     jobs = {f"{f}_{p}_{s}": {"family": f, "policy": p, "seed": s} for s in of for f in FAMILIES for p in POLICIES}
@@ -219,9 +219,9 @@ def run(_build: Path, seeds: int = 15, workers: int = 1) -> None:
         if suspect(FAMILIES[f], k, s)
     }
     checks = {name: {"family": f, "kind": k, "seed": s} for name, (f, k, s) in tiles.items()}
-    folder, backend = store.kept("nav_tasks", *INPUTS), "processes" if workers > 1 else "serial"
-    maps = sweep(mapped, jobs, folder / "map", workers, backend, "map")
-    looks = sweep(checked, checks, folder / "check", workers, backend, "check")
+    folder = store.kept("nav_tasks", *INPUTS)
+    maps = sweep(mapped, jobs, folder / "map", workers, label="map")
+    looks = sweep(checked, checks, folder / "check", workers, label="check")
     by = {f: {p: [maps[f"{f}_{p}_{s}"] for s in of] for p in POLICIES} for f in FAMILIES}
     data = {
         "seeds": [of[0], of[-1]],
@@ -241,4 +241,4 @@ def run(_build: Path, seeds: int = 15, workers: int = 1) -> None:
 
 def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seeds", type=int, default=15, help="of each family (default: %(default)s)")
-    parser.add_argument("--workers", type=int, default=1, help="processes (default: %(default)s)")
+    parser.add_argument("--workers", type=int, help="processes (default: all cores)")
