@@ -274,6 +274,21 @@ def test_what_is_kept_is_of_the_state_of_the_tree(monkeypatch, tmp_path):
     store.state.cache_clear()
 
 
+def test_place_and_route_is_repeated_for_other_gateware_only(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches.bridge import bench
+
+    run = {"lanes": 6, "seed": 2}
+    stored = {"gateware": "0123456789ab", "boards": {"ulx3s": {"runs": [run, {"lanes": 28}]}}}
+    monkeypatch.setattr(bench, "CACHE", tmp_path)
+    monkeypatch.setattr(bench.store, "read_result", lambda name: stored)
+    monkeypatch.setattr(bench.store, "state", lambda *parts: "0123456789ab")
+    assert bench.default_build("ulx3s", 6, [0]) == run
+    assert bench.default_build("ulx3s", 28, [0]) is None, "it was not placed"
+    monkeypatch.setattr(bench.store, "state", lambda *parts: "ba9876543210")
+    assert bench.default_build("ulx3s", 6, [0]) is None
+
+
 def test_a_peers_own_error_is_found(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(str(ROOT / "tools"))
     from benches import store

@@ -1,8 +1,9 @@
 """The bridge in an FPGA: every board at every number of lanes, resources, clock, cycles per tick.
 
 Place and route takes minutes each, an hour in all, and comes out the same from the same gateware and tools: every one is
-kept as long as these stand. `--placements N` ends after N new ones, and the table says what is missing. Timing figures
-are nextpnr's own; the limits of the PHY's pins are those of fpga/boards/report.py.
+kept as long as these stand, in bench/results/bridge.json, too, so that another machine does not repeat it. `--placements N`
+ends after N new ones, and the table says what is missing. Timing figures are nextpnr's own; the limits of the PHY's pins are
+those of fpga/boards/report.py.
 """
 
 import json
@@ -20,7 +21,8 @@ from ..markdown import wrap
 from .chain import LINKS
 
 ROOT = Path(__file__).resolve().parents[3]
-CACHE = store.kept("bridge", "fpga", "protocol", "requirements.lock")
+GATEWARE = ("fpga", "protocol", "requirements.lock")  # what place and route follows from
+CACHE = store.kept("bridge", *GATEWARE)
 sys.path[:0] = [str(ROOT / "fpga" / folder) for folder in ("boards", "tb")]
 
 import build as boards  # noqa: E402
@@ -55,9 +57,19 @@ def placed(name: str, lanes: int, seed: int) -> dict:
     return {**found, "problems": report.timing_problems(found, board.speed, board.phy)}
 
 
+def stored() -> dict[tuple[str, int], dict]:
+    """By board and number of lanes: the runs of the result that is stored, if it is of this gateware."""
+    found = store.read_result("bridge")
+    if found.get("gateware") != store.state(*GATEWARE):
+        return {}
+    return {(name, run["lanes"]): run for name, board in found["boards"].items() for run in measured(board)}
+
+
 def default_build(name: str, lanes: int, left: list[int]) -> dict | None:
     """What build.py's default command comes to: the first seed that meets every limit, or the last one tried. None: not
     measured yet, and no new placement is `left`."""
+    if run := stored().get((name, lanes)):
+        return run
     for seed in range(1, TRIES + 1):
         path = f"{name}_{lanes}_{seed}"
         if not (CACHE / f"{path}.json").exists():
@@ -221,7 +233,7 @@ def run(build: Path, placements: int = 10**6) -> None:
 
     `build` runs the pace alone.
     """
-    found = fabric(placements)
+    found = {"gateware": store.state(*GATEWARE)} | fabric(placements)
     found |= {"latency": {title: latency(link) for title, link in LINKS.items()}, "rates": rates(build)}
     store.write_result("bridge", found)
     store.write_chart("bridge_lanes", draw_lanes(found))
