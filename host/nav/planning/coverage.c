@@ -93,11 +93,18 @@ static int coverage_pop(struct nav_coverage *c)
     return first;
 }
 
+/* Whether a way of so many seconds to a state is the fastest so far. */
+static bool coverage_is_faster(const struct nav_coverage *c, int state, float seconds)
+{
+    const struct coverage_state *s = &c->state[state];
+    return s->place != COVERAGE_SETTLED && (s->place == COVERAGE_NEW || seconds < s->seconds);
+}
+
 /* A way to a state, taken where it is the fastest so far. */
 static void coverage_reach(struct nav_coverage *c, int state, struct coverage_state by)
 {
     struct coverage_state *s = &c->state[state];
-    if (s->place == COVERAGE_SETTLED || (s->place != COVERAGE_NEW && s->seconds <= by.seconds))
+    if (!coverage_is_faster(c, state, by.seconds))
         return;
     by.place = s->place == COVERAGE_NEW ? c->waiting++ : s->place;
     *s = by;
@@ -132,10 +139,13 @@ static void coverage_forward(struct nav_coverage *c, int state)
     double way = g->cell * (heading % 2 ? sqrt(2.0) : 1.0);
     if (!(passed >= COVERAGE_PASSED_LEAST))
         return;
-    double seconds = way / c->options.drive_m_s + (1.0 - open) * c->options.stopped_s;
+    float seconds = s->seconds + (float)(way / c->options.drive_m_s + (1.0 - open) * c->options.stopped_s);
+    next = next * COVERAGE_HEADINGS + heading;
+    if (!coverage_is_faster(c, next, seconds))
+        return; /* before the floor beside it is counted */
     double swept = passed * coverage_beside(c, column, row, heading);
-    coverage_reach(c, next * COVERAGE_HEADINGS + heading,
-                   (struct coverage_state){.seconds = s->seconds + (float)seconds,
+    coverage_reach(c, next,
+                   (struct coverage_state){.seconds = seconds,
                                            .swept = s->swept + (float)swept,
                                            .passed = (float)passed,
                                            .from = state});

@@ -17,7 +17,7 @@ from .actions import Vehicle
 from .ground import LIKELY, Ground, clearance, reach
 
 CELL_M = 0.05
-BUDGET = 30_000  # states
+BUDGET = 15_000  # states: 20 ms of the paper's netbook
 MARGIN_M = 0.6  # of ground around what is known
 BEEN_M = 0.05  # from where the robot's middle was: nothing stood there
 SPARE_M, WRONG_M = 0.03, 0.085  # by which a map of one's own is often wrong, and by which it is never
