@@ -36,7 +36,7 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tools/benches host": (("host",), ("host_cable", "host_clock")),
     "tools/benches image": (("node_image",), ()),
     "tools/benches levels": (("levels", "levels_shares"), ("levels_shares", "levels_speed")),
-    "tools/benches map": (("map",), ("map",)),
+    "tools/benches map": (("map",), ("map", "map_growing")),
     "tools/benches map_peers": (("map_peers",), ("map_peers",)),
     "tools/benches map_representations": (("map_representations",), ("map_representations",)),
     "tools/benches mechanics": (

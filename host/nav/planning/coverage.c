@@ -145,10 +145,8 @@ static void coverage_forward(struct nav_coverage *c, int state)
         return; /* before the floor beside it is counted */
     double swept = passed * coverage_beside(c, column, row, heading);
     coverage_reach(c, next,
-                   (struct coverage_state){.seconds = seconds,
-                                           .swept = s->swept + (float)swept,
-                                           .passed = (float)passed,
-                                           .from = state});
+                   (struct coverage_state){
+                       .seconds = seconds, .swept = s->swept + (float)swept, .passed = (float)passed, .from = state});
 }
 
 /* Whether a state was reached by a turn on the spot. */

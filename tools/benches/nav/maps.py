@@ -20,7 +20,7 @@ from crunchbot_lab.scenes.sweep import sweep
 
 from .. import store
 from ..markdown import table
-from . import charts
+from . import charts, map_growing
 
 PAPER = ("anchor", "robot", "raw", "noisy")
 TABLES = {  # of the page: family -> rows
@@ -272,6 +272,10 @@ def page(data: dict) -> str:
         "from the first pose, without it. Poses are those of the time, from the rows until then. Odometry is aligned, "
         "too. Faces are right within 15 mm and 1 degree after that motion, by length; corners within 50 mm, of those "
         "within reach of the path. Tiles: places that a texture whisker visited.\n\n"
+        "![a map after 10, 30, 100 and 300 seconds](../charts/map_growing.svg)\n\n"
+        f"A map of `{map_growing.FAMILY}`, seed {map_growing.SEED}, as it grows. Grey: floor known to be free. Thick lines: faces "
+        "that were felt. Circles: corners. Thin line: estimated path; dots: true path. Dashes: true walls and boxes, which the "
+        "robot does not know.\n\n"
         "## No gyroscope\n\n"
         + families
         + "\nLoops: a face touched again after a metre or more without it. Right: both touches are of one line of faces; a "
@@ -304,6 +308,7 @@ def run(_build: Path, seeds: int = 100, workers: int = WORKERS) -> None:
     data = measure(seeds, workers)
     store.write_result("map", data)
     store.write_chart("map", chart(data), letters=True)
+    store.write_chart("map_growing", map_growing.figure())
     store.write_page(PAGE, page(data))
 
 
