@@ -59,6 +59,7 @@ class ChainRun:
     filters: tuple[str, ...] = FILTERS
     known: Path | None = None  # scene folder that the navigator is given; None: that of the world
     map_folder: Path | None = None  # a mapper in the navigator's place writes it
+    choice: parts.Choice = parts.Choice()  # of turns and drives
     before: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # by a program's name: words before its own
 
     @property
@@ -104,7 +105,7 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="whisker-")))
         stack.callback(_remove_ring, ring)
         places = Places(ring, folder, *_free_endpoints(3))
-        body = parts.Body(run.scene, run.out / "models", run.create, places.serial, run.seed)
+        body = parts.Body(run.scene, run.out / "models", run.create, places.serial, run.seed, run.choice)
         table = parts.Table(body, places, run.program)
         bridge = Child(_bridge(run, table), run.logs / "bridge.log", _ticks(progress))
         children = [stack.enter_context(closing(bridge))]

@@ -115,7 +115,8 @@ def chart(data: dict) -> Figure:
             ax.plot(n, r["mean_s"], "D", color="white", markeredgecolor="black", markersize=4)
         ax.axhline(r["bound_s"], color="black", linestyle=":", linewidth=1.0)
         ax.set_title(family, fontsize=9)
-        ax.set_xticks(range(len(by)), list(by), rotation=60, fontsize=8)
+        names = [policy.replace(", ", ",\n") for policy in by]
+        ax.set_xticks(range(len(by)), names, rotation=90, fontsize=8)
         ax.set_ylim(0, None)
     figure.axes[0].set_ylabel(
         "s until lock: bar median, diamond mean,\nline to the 90 % quantile; dots: bound", fontsize=8

@@ -150,7 +150,7 @@ def chart(data: dict) -> Figure:
         ax.axhline(100 * GOAL, color="0.6", linewidth=0.8)
         ax.set(title=family, xlabel="minutes", ylim=(0, 102), xticks=MINUTES)
     figure.axes[0].set_ylabel("tiles visited, % of the reachable;\ngrey: the goal", fontsize=8)
-    figure.axes[-1].legend(fontsize=8, loc="lower right")
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside right center", fontsize=8, frameon=False)
     return figure
 
 
