@@ -6,6 +6,7 @@
 
 static const double PITCH_LEAST = 0.15, PITCH_MOST = 1.2, PITCH_STEP = 1.015; /* m, m, ratio */
 static const double BORDER_SIGMA = 0.03;                                      /* m */
+static const double KERNEL_LEAST = 0.01;                                      /* of a blur that is added */
 static const double STRAY = 0.25;                                             /* share of borders that are on no line */
 static const double EVIDENCE = 6.0;                                           /* nats */
 static const double LIKE_PITCH = 0.04, LIKE_TURN = 0.12;                      /* ratio, rad: two candidates are one */
@@ -52,23 +53,25 @@ static double lattice_score(const struct nav_trail *t, const struct nav_lattice 
 /* The phase about which most values lie, by a histogram blurred with the borders' spread. */
 static double lattice_phase(const double *value, int count, double pitch)
 {
-    double bin[BINS] = {0.0}, kernel[BINS / 2] = {0.0}, best = -1.0, at = 0.0;
-    for (int d = 0; d < BINS / 2; d++)
-        kernel[d] = exp(-0.5 * pow(d * pitch / BINS / BORDER_SIGMA, 2.0));
+    double bin[3 * BINS] = {0.0}, *middle = bin + BINS, sum[BINS]; /* a period, and the ones beside it */
+    int best = 0;
     for (int n = 0; n < count; n++) {
         double share = value[n] / pitch;
-        bin[(int)((share - floor(share)) * BINS) % BINS] += 1.0;
+        middle[(int)((share - floor(share)) * BINS) % BINS] += 1.0;
     }
-    for (int b = 0; b < BINS; b++) {
-        double sum = bin[b];
-        for (int d = 1; d < BINS / 2 && kernel[d] > 0.01; d++)
-            sum += kernel[d] * (bin[(b + d) % BINS] + bin[(b + BINS - d) % BINS]);
-        if (sum > best) {
-            best = sum;
-            at = (b + 0.5) / BINS * pitch;
-        }
+    memcpy(bin, middle, sizeof sum);
+    memcpy(middle + BINS, middle, sizeof sum);
+    memcpy(sum, middle, sizeof sum);
+    for (int d = 1; d < BINS / 2; d++) {
+        double kernel = exp(-0.5 * pow(d * pitch / BINS / BORDER_SIGMA, 2.0));
+        if (!(kernel > KERNEL_LEAST))
+            break;
+        for (int b = 0; b < BINS; b++)
+            sum[b] += kernel * (middle[b + d] + middle[b - d]);
     }
-    return at;
+    for (int b = 1; b < BINS; b++)
+        best = sum[b] > sum[best] ? b : best;
+    return (best + 0.5) / BINS * pitch;
 }
 
 static void lattice_keep(struct lattice_list *list, const struct nav_lattice *l)
