@@ -110,8 +110,8 @@ def live_navigation_equals_localising_the_recording(out) -> None:
 
 def test_same_seed_gives_the_same_summary_and_another_seed_another(tmp_path):
     """Models that are kept from an earlier run are those that are learnt anew, in an empty cache."""
-    first, other = (demo(tmp_path / name, seed) for name, seed in (("a", 5), ("c", 6)))
-    again = demo(tmp_path / "b", 5, XDG_CACHE_HOME=str(tmp_path / "cache"))
+    first, other = (demo(tmp_path / name, seed) for name, seed in (("a", 1), ("c", 3)))
+    again = demo(tmp_path / "b", 1, XDG_CACHE_HOME=str(tmp_path / "cache"))
     assert [path.name for path in (tmp_path / "cache/crunchbot/models").iterdir()], "it has learnt, and kept it"
     untimed = [{key: v for key, v in s.items() if "wall" not in key} for s in (first, again, other)]
     assert untimed[0] == untimed[1] != untimed[2]
