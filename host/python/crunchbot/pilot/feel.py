@@ -8,7 +8,7 @@ import numpy as np
 
 from ..scene import Whisker
 from ..touch.contact import Contact
-from ..touch.contact_filter import ContactFilter, Reports
+from ..touch.contact_filter import ContactFilter, Reports, cone_of
 from ..touch.radial.whisk import WhiskModel
 from .states import TICK_S
 
@@ -77,7 +77,7 @@ class Feeler:
         self._filter = ContactFilter(
             whisker.length_m,
             kappa=model.kappa,
-            cone_m=1e-3 * model.cone_mm,
+            cone_m=cone_of(model, whisker.length_m),
             gain_sd=model.spread,
             noise_rad=NOISE_COUNTS / self._per_rad,
         )

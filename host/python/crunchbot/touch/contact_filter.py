@@ -35,8 +35,14 @@ SETTINGS = {
 }
 POSITIVE = ("cone_m", "kappa", "creep_s", "noise_rad", "largest_rad", "ring_hz", "sample_s")
 LIMITS = {"friction": 0.5, "moving": 0.5, "caught": 0.3, "other": 0.1}
+TIPS = (0.3001, 0.8499)  # length over cone, just within the ends of the beam's tables (contact_beam.h)
 LEAST_SAMPLES = 100
 MOTIONS = ("body whisk", "drive-by", "sweep")
+
+
+def cone_of(model: WhiskModel, length_m: float) -> float:
+    """A calibration's cone, m, or the nearest one that the beam's tables hold: whisks tell it to some 15 %."""
+    return length_m / float(np.clip(length_m / (1e-3 * model.cone_mm), *TIPS))
 
 
 class Reports(NamedTuple):
@@ -117,7 +123,7 @@ class ContactFilter:
             bases[:, 1] = -1e-3 * np.abs(push[:end])
         else:
             bases[:, 2] = -np.abs(turn[:end])
-        made = {"kappa": model.kappa, "cone_m": 1e-3 * model.cone_mm, "gain_sd": model.spread}
+        made = {"kappa": model.kappa, "cone_m": cone_of(model, LENGTH_M), "gain_sd": model.spread}
         made |= {"noise_rad": max(noise, 1e-9) / per_rad, "sample_s": float(t_s[-1] - t_s[0]) / (len(t_s) - 1)}
         return cls(**(made | settings)), bases, np.column_stack([along, across])[:end] / per_rad
 

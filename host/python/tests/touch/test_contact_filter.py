@@ -7,9 +7,12 @@ import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from whisks import whisk, whisks
 
+from crunchbot import scene
+from crunchbot.pilot.feel import Feeler
 from crunchbot.touch.contact_filter import ContactFilter
 from crunchbot.touch.radial import model as radial
 from crunchbot.touch.radial.shape import Contact
+from crunchbot.touch.radial.whisk import WhiskModel
 from crunchbot_lab.signals.mechanics import Whisker, touch
 
 TICK_S = 5e-4
@@ -97,6 +100,17 @@ def test_a_calibration_by_whisks_is_enough_to_follow_a_whisk(tmp_path, capsys):
     assert last["motion"] == "body whisk"
     assert abs(np.hypot(*last["point_mm"]) - 115.0) < min(5.0, 3.0 * last["point_sd_mm"][0])
     assert reported[2]["point_sd_mm"][0] > 2.0 * last["point_sd_mm"][0]
+
+
+@pytest.mark.parametrize("cone_mm", [141.0, 1000.0])
+def test_a_cone_that_whisks_told_badly_is_followed_all_the_same(cone_mm):
+    """The limits of a fit are wider than those of the beam's tables."""
+    rng = np.random.default_rng(4)
+    model = WhiskModel(radial.fit(whisks(rng, 5), "whisk").model.content | {"cone_mm": cone_mm})
+    follower, bases, tilts = ContactFilter.calibrated(model, whisk(115.0, rng))
+    assert len(follower.run(bases, tilts).sample) > 20
+    whisker = scene.Whisker("front", "object", None, (0.0, 0.0), 0.0, 0.14)
+    Feeler(whisker, 1.0, model, 1.0)
 
 
 def test_what_cannot_be_followed_is_one_line(tmp_path, capsys):
