@@ -52,7 +52,8 @@ fi
 with_preset "$(basename "$1")"
 with_preset asan
 with_preset tsan
-# The open FPGA tools compile themselves at their first start: once, before two processes of tests do it at once.
+# The open FPGA tools compile themselves at their first start: once, before processes of tests do it at once.
 (cd fpga && ../.venv/bin/python -c 'import toolchain; toolchain.warm_up("yosys", "nextpnr-himbaechel-gowin")')
 echo "test: Python, gateware, end to end"
-WHISKER_BUILD=$1 .venv/bin/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
+# Three processes for two cores: many tests wait for a simulated robot.
+WHISKER_BUILD=$1 .venv/bin/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
