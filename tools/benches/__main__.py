@@ -55,10 +55,14 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
 }
 # Options of the topics whose full size takes more than some minutes, as `make bench` gives them.
 ROUND = {
-    "map": ["--seeds", "50"],
-    "nav": ["--seeds", "20"],
-    "nav_peers": ["--seeds", "20"],
+    "map": ["--seeds", "20"],
+    "map_representations": ["--seeds", "3"],
+    "nav": ["--seeds", "10"],
+    "nav_active": ["--seeds", "20"],
+    "nav_peers": ["--seeds", "8"],
     "nav_size": ["--seeds", "10"],
+    "nav_tasks": ["--seeds", "8"],
+    "nav_unseen": ["--seeds", "10"],
     "ring": ["--rounds", "1"],
     "robot": ["--levels", "0", "1", "2"],
     "usb": ["--frames", "500000"],
