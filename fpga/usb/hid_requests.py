@@ -28,7 +28,8 @@ class HidRequests(ControlRequestHandler):
                index, data, valid    its bytes; index 0 begins it again
                done, accept          accept is read in the cycle of done; refused: STALL
         read:  start, id, packet     a read of report `id` begins at byte 64 * packet
-               next, data            data is the report's next byte from two cycles after start on
+               next, data            data is the report's next byte from two cycles after start on; up to two are
+                                     read before they are sent
                open                  from the first start to the status stage, or to the next SETUP
     """
 
@@ -54,6 +55,8 @@ class HidRequests(ControlRequestHandler):
         self.left = Signal(range(max(report.size for report in REPORTS.values()) + 1))  # bytes not yet acknowledged
         self.sent = Signal()  # the packet of a read, and not yet acknowledged
         self.sending = Signal()
+        self.unread = Signal(range(PACKET + 1))  # bytes of a read's packet that are not read yet
+        self.held = Signal(2)  # bytes read ahead, not sent yet
         self.decided = Signal()
         is_class = self.interface.setup.type == USBRequestType.CLASS
         m.d.comb += self.interface.claim.eq(is_class)
@@ -85,6 +88,7 @@ class HidRequests(ControlRequestHandler):
         setup = self.interface.setup
         with m.If(setup.received):
             m.d.usb += [self.kind.eq(0), self.sending.eq(0), self.decided.eq(0)]
+            m.d.usb += [self.unread.eq(0), self.held.eq(0)]
             m.d.usb += [self.sent.eq(0), self.read_packet.eq(0), self.interface.tx_data_pid.eq(1)]
             ours = (setup.recipient == USBRequestRecipient.INTERFACE) & (setup.index == LIMITS["usb_hid_interface"])
             ours &= self.interface.active_config != 0
@@ -116,28 +120,39 @@ class HidRequests(ControlRequestHandler):
 
     def _get_report(self, m):
         """Data stage: packets of 64 bytes, each sent again from its first byte when the host asks again before it has
-        acknowledged it. Status stage: ACK."""
-        itf = self.interface
-        loading = Signal()
-        sending = self.sending
-        in_packet = Signal(range(PACKET + 1))  # bytes of this packet not yet sent
+        acknowledged it. Status stage: ACK.
+
+        Two bytes are read ahead: whether the next one is read follows from registers alone, so that no path leads from
+        the transmitter's `ready` through the registers' memories and back to its payload within a cycle."""
+        itf, tx = self.interface, self.interface.tx
+        loading, first, taken = Signal(), Signal(), Signal()
+        ahead, after = Signal(8), Signal(8)  # the byte to send, and the one behind it
         size = Mux(self.left < PACKET, self.left, PACKET)
-        first = Signal()
         m.d.usb += loading.eq(itf.data_requested)
         m.d.comb += [
             self.read_start.eq(itf.data_requested),
             self.read_id.eq(itf.setup.value[:8]),
-            itf.tx.valid.eq(sending),
-            itf.tx.first.eq(sending & first),
-            itf.tx.last.eq(sending & (in_packet == 1)),
-            itf.tx.payload.eq(self.read_data),
-            self.read_next.eq(sending & itf.tx.ready),
+            self.read_next.eq((self.unread != 0) & (self.held != 2)),
+            tx.valid.eq(self.held != 0),
+            tx.first.eq((self.held != 0) & first),
+            tx.last.eq((self.held == 1) & (self.unread == 0)),
+            tx.payload.eq(ahead),
+            taken.eq(tx.valid & tx.ready),
             itf.handshakes_out.ack.eq(itf.status_requested),
         ]
-        with m.If(loading):
-            m.d.usb += [sending.eq(self.left != 0), first.eq(1), in_packet.eq(size), self.sent.eq(self.left != 0)]
-        with m.Elif(self.read_next):
-            m.d.usb += [in_packet.eq(in_packet - 1), first.eq(0), sending.eq(in_packet != 1)]
+        with m.If(itf.data_requested):
+            m.d.usb += [self.unread.eq(0), self.held.eq(0)]
+        with m.Elif(loading):
+            m.d.usb += [self.unread.eq(size), first.eq(1), self.sent.eq(self.left != 0)]
+        with m.Else():
+            m.d.usb += [self.unread.eq(self.unread - self.read_next), self.held.eq(self.held + self.read_next - taken)]
+        with m.If(taken):
+            m.d.usb += [ahead.eq(after), first.eq(0)]
+        with m.If(self.read_next):
+            with m.If(self.held == taken):
+                m.d.usb += ahead.eq(self.read_data)
+            with m.Else():
+                m.d.usb += after.eq(self.read_data)
         with m.If(itf.handshakes_in.ack & self.sent):
             m.d.usb += [self.sent.eq(0), self.left.eq(self.left - size), self.read_packet.eq(self.read_packet + 1)]
             m.d.usb += itf.tx_data_pid.eq(~itf.tx_data_pid)

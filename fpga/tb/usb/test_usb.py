@@ -1,5 +1,6 @@
 """The USB parts the project adds to LUNA, in Amaranth's simulator: descriptors, HID requests, the mended endpoint."""
 
+import random
 import sys
 from pathlib import Path
 
@@ -210,6 +211,7 @@ class ControlHost:
 
     def __init__(self, ctx, handler):
         self.ctx, self.handler, self.bus = ctx, handler, handler.interface
+        self.random = random.Random(1)
 
     async def setup(self, request: int, value: int, length: int, is_in: bool, index: int = LIMITS["usb_hid_interface"]):
         setup, fields = self.bus.setup, {"request": request, "value": value, "length": length, "index": index}
@@ -248,21 +250,29 @@ class ControlHost:
         self.ctx.set(self.bus.rx.next, 0)
         return await self.ask(self.bus.rx_ready_for_response), bytes(seen)
 
-    async def read(self, acknowledge: bool = True) -> bytes:
-        """A packet of the data stage of a read: the registers show the position as the byte."""
+    async def read(self, acknowledge: bool = True, share: float = 1.0) -> bytes:
+        """A packet of the data stage of a read: the registers show the position as the byte. `share`: of cycles in which
+        the transmitter is ready."""
         assert await self.ask(self.bus.data_requested) == ""
         base = 64 * self.ctx.get(self.handler.read_packet)
-        out, position = bytearray(), 0
-        await self.ctx.tick("usb")
-        self.ctx.set(self.bus.tx.ready, 1)
-        while self.ctx.get(self.bus.tx.valid):
-            self.ctx.set(self.handler.read_data, base + position)
-            assert self.ctx.get(self.bus.tx.first) == (position == 0)
-            assert self.ctx.get(self.bus.tx_data_pid) == 1 - base // 64 % 2
-            out.append(self.ctx.get(self.bus.tx.payload))
+        out, position, over, cycles = bytearray(), 0, False, 0
+        while not over:
+            cycles += 1
+            assert cycles < 1000, "the packet has an end"
+            takes = self.random.random() < share
+            self.ctx.set(self.bus.tx.ready, takes)
+            self.ctx.set(self.handler.read_data, (base + position) % 256)
+            if self.ctx.get(self.bus.tx.valid) and takes:
+                assert self.ctx.get(self.bus.tx.first) == (not out)
+                assert self.ctx.get(self.bus.tx_data_pid) == 1 - base // 64 % 2
+                out.append(self.ctx.get(self.bus.tx.payload))
+                over = self.ctx.get(self.bus.tx.last)
             position += self.ctx.get(self.handler.read_next)
+            assert position - len(out) <= 2, "bytes read ahead"
             await self.ctx.tick("usb")
+        assert share < 1.0 or cycles == 2 + len(out), "a byte in each cycle, once the first is there"
         self.ctx.set(self.bus.tx.ready, 0)
+        assert not self.ctx.get(self.bus.tx.valid)
         if acknowledge:
             await pulse(self.ctx, self.bus.handshakes_in.ack)
         return bytes(out)
@@ -282,9 +292,10 @@ def value(report_id: int, kind: int = FEATURE) -> int:
     return kind << 8 | report_id
 
 
+@pytest.mark.parametrize("share", [1.0, 0.4])
 @pytest.mark.parametrize("name", READ)
 @pytest.mark.parametrize("asked", [255, 64, 5, 1])
-def test_get_report_sends_the_report_or_what_fits_packet_by_packet(name, asked):
+def test_get_report_sends_the_report_or_what_fits_packet_by_packet(name, asked, share):
     report = REPORTS[name]
 
     async def scenario(host):
@@ -292,8 +303,8 @@ def test_get_report_sends_the_report_or_what_fits_packet_by_packet(name, asked):
         wanted = bytes(range(min(asked, report.size)))
         got = b""
         while got != wanted:
-            packet = await host.read(acknowledge=False)
-            assert packet and await host.read() == packet, "asked again when the host's ACK was lost"
+            packet = await host.read(acknowledge=False, share=share)
+            assert packet and await host.read(share=share) == packet, "asked again when the host's ACK was lost"
             got += packet
         assert host.ctx.get(host.handler.read_open)
         assert await host.status() == "ack"
