@@ -55,11 +55,11 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
 }
 # Options of the topics whose full size takes more than some minutes, as `make bench` gives them.
 ROUND = {
-    "map": ["--seeds", "20"],
+    "map": ["--seeds", "15"],
     "map_representations": ["--seeds", "3"],
-    "nav": ["--seeds", "10"],
+    "nav": ["--seeds", "5"],
     "nav_active": ["--seeds", "20"],
-    "nav_peers": ["--seeds", "8"],
+    "nav_peers": ["--seeds", "5"],
     "nav_size": ["--seeds", "10"],
     "nav_tasks": ["--seeds", "8"],
     "nav_unseen": ["--seeds", "10"],
