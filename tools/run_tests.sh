@@ -52,7 +52,7 @@ fi
 with_preset "$(basename "$1")"
 with_preset asan
 with_preset tsan
-# The open FPGA tools compile themselves at their first start: once, before processes of tests do it at once.
+# The open FPGA tools compile themselves at their first start: once, before several processes do it at the same time.
 (cd fpga && ../.venv/bin/python -c 'import toolchain; toolchain.warm_up("yosys", "nextpnr-himbaechel-gowin")')
 echo "test: Python, gateware, end to end"
 # Three processes for two cores: many tests wait for a simulated robot.

@@ -1,9 +1,9 @@
 """The bridge in an FPGA: every board at every number of lanes, resources, clock, cycles per tick.
 
 Place and route takes minutes each, an hour in all, and comes out the same from the same gateware and tools: every one is
-kept as long as these stand, in bench/results/bridge.json, too, so that another machine does not repeat it (to repeat it, delete `gateware` there). `--placements N`
-ends after N new ones, and the table says what is missing. Timing figures are nextpnr's own; the limits of the PHY's pins are
-those of fpga/boards/report.py.
+kept as long as these stand, in bench/results/bridge.json, too, so that another machine does not repeat it (to repeat
+it, delete `gateware` there). `--placements N` ends after N new ones, and the table says what is missing. Timing figures
+are nextpnr's own; the limits of the PHY's pins are those of fpga/boards/report.py.
 """
 
 import json

@@ -41,7 +41,7 @@ MOTIONS = ("body whisk", "drive-by", "sweep")
 
 
 def cone_of(model: WhiskModel, length_m: float) -> float:
-    """A calibration's cone, m, or the nearest one that the beam's tables hold: whisks tell it to some 15 %."""
+    """The cone of a calibration, m, limited to what the beam's tables hold."""
     return length_m / float(np.clip(length_m / (1e-3 * model.cone_mm), *TIPS))
 
 

@@ -103,8 +103,8 @@ def test_a_calibration_by_whisks_is_enough_to_follow_a_whisk(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("cone_mm", [141.0, 1000.0])
-def test_a_cone_that_whisks_told_badly_is_followed_all_the_same(cone_mm):
-    """The limits of a fit are wider than those of the beam's tables."""
+def test_a_calibrated_cone_is_limited_to_the_beams_tables(cone_mm):
+    """A fit has wider limits."""
     rng = np.random.default_rng(4)
     model = WhiskModel(radial.fit(whisks(rng, 5), "whisk").model.content | {"cone_mm": cone_mm})
     follower, bases, tilts = ContactFilter.calibrated(model, whisk(115.0, rng))
