@@ -21,7 +21,8 @@ from ..markdown import wrap
 from .chain import LINKS
 
 ROOT = Path(__file__).resolve().parents[3]
-GATEWARE = ("fpga", "protocol", "requirements.lock")  # what place and route follows from
+# What place and route follows from.
+GATEWARE = ("fpga/boards", "fpga/bridge_rtl", "fpga/usb", "fpga/toolchain.py", "protocol", "requirements.lock")
 CACHE = store.kept("bridge", *GATEWARE)
 sys.path[:0] = [str(ROOT / "fpga" / folder) for folder in ("boards", "tb")]
 
