@@ -14,7 +14,7 @@ import hashlib
 import json
 import subprocess
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib
@@ -100,9 +100,19 @@ class Scale:
     soak_rows: int = 1_000_000
 
 
+BY_SEED = (
+    "reference_seeds",
+    "budget_runs",
+    "balance_seeds",
+    "variation_seeds",
+)  # parts of a Scale that have at most `seeds`
+
+
 def scale(seeds: int) -> Scale:
-    """The full one with so many seeds; what is slow has its share of them (`Bench.sizes`)."""
-    return Scale(seeds, min(seeds, 20))
+    """The full one with no part of more seeds than this; what is slow has its share of them (`Bench.sizes`)."""
+    whole = Scale()
+    few = {name: min(seeds, getattr(whole, name)) for name in BY_SEED}
+    return replace(whole, seeds=seeds, **few)
 
 
 QUICK = Scale(4, 2, 2, 1000, 2, 500, 1, 20_000)
