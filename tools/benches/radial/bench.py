@@ -17,13 +17,13 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
-from tqdm import tqdm
 
 from crunchbot.native import doubles, ffi, lib
 from crunchbot.touch.radial import model as radial
 from crunchbot.touch.radial.shape import shape_of
 from crunchbot.touch.radial.whisk import WhiskModel
 from crunchbot_lab.report.figures import SETTINGS
+from crunchbot_lab.scenes.sweep import sweep
 
 from .. import store
 from .real import METHODS, page, real_whisker
@@ -221,17 +221,23 @@ def fig5() -> dict:
     return {"whiskers": points, "combined_mm": radial.RadialModel.fit(all_peaks, all_radii).sigma_mm}
 
 
-PARTS = {
+PARTS = {  # the longest first: two run at once
+    "tips": tips,
     "errors": lambda: {
         source: errors_of(lambda s, source=source: Kind(s, source), n) for n, source in enumerate(SOURCES)
     },
     "speeds": lambda: errors_of(lambda s: Kind(s, speeds=3.0), 10),
     "rates": lambda: {str(hz): errors_of(lambda s, hz=hz: Kind(s, hz=hz), 11) for hz in (100.0, 35.0)},
-    "tips": tips,
     "stability": stability,
-    "cost": cost,
     "fig5": fig5,
 }
+
+
+def measured(part: str) -> dict:
+    """One of PARTS."""
+    return PARTS[part]()
+
+
 LOOKS = {"paper": "o", "quadratic": "s", "rational": "^", "whisk": "D", "press": "v"}
 
 
@@ -292,8 +298,8 @@ def run(build: Path, whisker3d: str | None = None) -> None:
         store.write_page(ROOT / "docs/results/radial_real.md", page(real))
     else:
         store.leave_out("real whisker", "give --whisker3d DIR or WHISKER3D_DIR (tools/benches radial --help)")
-    parts = tqdm(PARTS.items(), desc="radial")
-    results = {name: store.once(CACHE / f"{name}.json", measure) for name, measure in parts}
+    results = sweep(measured, {name: {"part": name} for name in PARTS}, CACHE, label="radial")
+    results["cost"] = store.once(CACHE / "cost.json", cost)  # alone: a time
     points = results["fig5"]["whiskers"]
     kept = results | {
         "fig5": {"combined_mm": results["fig5"]["combined_mm"], "error_mm": [w["error_mm"] for w in points]}

@@ -3,7 +3,7 @@
 .venv/bin/python tools/benches restart                  20 scenes, 4 moments each; writes bench/results/restart.json
 .venv/bin/python tools/benches restart --scenes 2       a short one, printed
 
-Level 1: the world's signals through a pilot with models that it learnt, half a minute a scene; runs are kept in --runs.
+Level 1: the world's signals through a pilot with models that it learnt, half a minute a scene.
 Each row is weighed. Of each run a navigator is killed at moments drawn by the seed, and the next one, of the same
 filter, gets the rows after a gap:
 
@@ -14,7 +14,6 @@ filter, gets the rows after a gap:
 
 import argparse
 import json
-import pickle
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,12 +31,12 @@ from crunchbot.robot.track import Track
 from crunchbot.scene import Prior
 from crunchbot_lab.demo.level1 import explore
 from crunchbot_lab.demo.training import learn
+from crunchbot_lab.scenes.sweep import sweep
 from crunchbot_lab.simulation.scenes import make_scene
 
 from .. import store
 
 ROOT = Path(__file__).resolve().parents[3]
-RUNS = store.kept("restart")
 FIRST_SEED, SCENES, FILTER = 9101, 20, "adaptive"
 RUN_S, FIRST_S, LAST_S, AFTER_S = 200, 30.0, 130.0, 60.0
 NEAR_M, STAYS_S = 0.25, 3.0  # as in the drills
@@ -54,16 +53,12 @@ class Run:
     truth: np.ndarray
 
 
-def make_run(seed: int, kept: Path) -> Run:
+def make_run(seed: int) -> Run:
     scene, start = make_scene(seed)
-    file = kept / f"run{seed}.pickle"
-    if not file.exists():
-        with tempfile.TemporaryDirectory() as folder:
-            learn(Path(folder), scene, seed, lambda: None)
-            pilot = Pilot(scene.robot, *load_models(Path(folder), scene.robot), seed)
-        kept.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(pickle.dumps(explore(scene, start, pilot, seed, RUN_S * 2000)))
-    rows, truth = pickle.loads(file.read_bytes())
+    with tempfile.TemporaryDirectory() as folder:
+        learn(Path(folder), scene, seed, lambda: None)
+        pilot = Pilot(scene.robot, *load_models(Path(folder), scene.robot), seed)
+    rows, truth = explore(scene, start, pilot, seed, RUN_S * 2000)
     return Run(scene, rows, np.array([[row["x_m"], row["y_m"], row["theta_rad"]] for row in truth]))
 
 
@@ -147,8 +142,8 @@ def trial(run: Run, killed: int, folder: Path, before: dict) -> list[dict]:
     return out
 
 
-def trials(seed: int, moments: int, kept: Path) -> list[dict]:
-    run, rng = make_run(seed, kept), np.random.default_rng([seed, 1])
+def trials(seed: int, moments: int) -> dict[str, list[dict]]:
+    run, rng = make_run(seed), np.random.default_rng([seed, 1])
     killed = sorted(rng.choice(np.arange(round(FIRST_S * 10), round(LAST_S * 10)), moments, replace=False))
     out = []
     with tempfile.TemporaryDirectory() as folder:
@@ -158,7 +153,7 @@ def trials(seed: int, moments: int, kept: Path) -> list[dict]:
             if n in killed:
                 out += trial(run, n, Path(folder), {"file": path.read_bytes(), "right": errors[-1] <= NEAR_M})
             errors.append(off(navigator.take(received), run.truth[n]))
-    return [entry | {"seed": seed} for entry in out]
+    return {"restarts": out}
 
 
 def summary(entries: list[dict]) -> dict:
@@ -183,12 +178,12 @@ def quantiles(values: np.ndarray) -> np.ndarray:
     return np.quantile(values, [0.5, 0.9, 1.0], method="higher")
 
 
-def run(build: Path, scenes: int = SCENES, moments: int = 4, runs: Path = RUNS, out: Path | None = None) -> None:
+def run(build: Path, scenes: int = SCENES, moments: int = 4, out: Path | None = None) -> None:
     """`build` is not used: the Python modules are what counts."""
-    entries = []
-    for seed in range(FIRST_SEED, FIRST_SEED + scenes):
-        entries += trials(seed, moments, runs)
-        print(f"{seed}: {sum(e['right'] for e in entries) // (2 * len(CASES))} kills of a right belief", flush=True)
+    seeds = range(FIRST_SEED, FIRST_SEED + scenes)
+    jobs = {f"{seed}, {moments} moments": {"seed": seed, "moments": moments} for seed in seeds}
+    done = sweep(trials, jobs, store.kept("restart"), label="restart")
+    entries = [entry for of in done.values() for entry in of["restarts"]]
     found = {"filter": FILTER, "scenes": scenes, "moments": moments, "cases": summary(entries)}
     kills = len(entries) // (2 * len(CASES))
     found |= {"kills": kills, "right before": sum(e["right"] for e in entries) // (2 * len(CASES))}
@@ -203,5 +198,4 @@ def run(build: Path, scenes: int = SCENES, moments: int = 4, runs: Path = RUNS, 
 def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", type=int, default=SCENES)
     parser.add_argument("--moments", type=int, default=4, help="kills per scene (4)")
-    parser.add_argument("--runs", type=Path, default=RUNS, help="kept here: pickled runs")
     parser.add_argument("--out", type=Path, help="default: bench/results/restart.json when all scenes are run")
