@@ -70,7 +70,7 @@ def draw(found: dict) -> Figure:
     for (case, points), style in zip(found.items(), ("^-", "o-", "s--"), strict=True):
         axes.plot([p["lanes"] for p in points], [p["realtime_factor"] for p in points], style, label=case)
     axes.axhline(1.0, color="0.3", linewidth=1)
-    axes.annotate("real time", (LANES[-1], 1.0), textcoords="offset points", xytext=(0, 4), ha="right", color="0.3")
+    axes.annotate("real time", (LANES[-1], 1.0), textcoords="offset points", xytext=(0, -14), ha="right", color="0.3")
     axes.set(xlabel="populated lanes", ylabel="simulated seconds per processor second", yscale="log", xticks=LANES)
     axes.legend(frameon=False, title="bridge and nodes, level")
     return figure
