@@ -100,12 +100,8 @@ class Scale:
     soak_rows: int = 1_000_000
 
 
-BY_SEED = (
-    "reference_seeds",
-    "budget_runs",
-    "balance_seeds",
-    "variation_seeds",
-)  # parts of a Scale that have at most `seeds`
+# Parts of a Scale that have no more runs than `seeds`.
+BY_SEED = ("reference_seeds", "budget_runs", "balance_seeds", "variation_seeds")
 
 
 def scale(seeds: int) -> Scale:

@@ -221,7 +221,7 @@ def fig5() -> dict:
     return {"whiskers": points, "combined_mm": radial.RadialModel.fit(all_peaks, all_radii).sigma_mm}
 
 
-PARTS = {  # the longest first: two run at once
+PARTS = {  # the longest first: they run on all cores
     "tips": tips,
     "errors": lambda: {
         source: errors_of(lambda s, source=source: Kind(s, source), n) for n, source in enumerate(SOURCES)
@@ -299,7 +299,7 @@ def run(build: Path, whisker3d: str | None = None) -> None:
     else:
         store.leave_out("real whisker", "give --whisker3d DIR or WHISKER3D_DIR (tools/benches radial --help)")
     results = sweep(measured, {name: {"part": name} for name in PARTS}, CACHE, label="radial")
-    results["cost"] = store.once(CACHE / "cost.json", cost)  # alone: a time
+    results["cost"] = store.once(CACHE / "cost.json", cost)  # not beside the others, for it measures time
     points = results["fig5"]["whiskers"]
     kept = results | {
         "fig5": {"combined_mm": results["fig5"]["combined_mm"], "error_mm": [w["error_mm"] for w in points]}
