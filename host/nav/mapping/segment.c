@@ -5,7 +5,7 @@
 static const double GATE = 12.0;        /* squared standard deviations */
 static const double FACING = 0.7;       /* cosine between the normals of a face and a segment of it */
 static const double AXES_KNOWN = 1.0;   /* rad^2 */
-static const double SEGMENT_HITS = 4.0; /* contacts that a segment counts for */
+static const double SEGMENT_HITS = 4.0; /* contacts that a segment counts for, at most */
 
 /* A segment as one of a face: how far its middle is off, how far it is turned. */
 struct segment_match {
@@ -68,8 +68,9 @@ static void segment_match_axes(const struct nav_joint *j, const struct nav_touch
     m->likelihood = variance > AXES_KNOWN ? 2.0 / NAV_PI : nav_face_normal_density(m->turn, variance) / 4.0;
 }
 
+/* fresh: density of faces not in the map, 1 / m. */
 static void segment_weigh(const struct nav_faces *f, const struct nav_joint *j, const struct nav_touches_line *line,
-                          struct segment_choice *c)
+                          double fresh, struct segment_choice *c)
 {
     int count = f->count;
     double right = f->right / (f->right + f->refused);
@@ -78,8 +79,8 @@ static void segment_weigh(const struct nav_faces *f, const struct nav_joint *j, 
         c->likelihood[n] = c->match[n].likelihood;
     }
     segment_match_axes(j, line, &c->match[count]);
-    c->likelihood[count] = NAV_FACE_NEW_PER_M * right * c->match[count].likelihood;
-    c->likelihood[count + 1] = NAV_FACE_NEW_PER_M * (1.0 - right) / (2.0 * NAV_PI);
+    c->likelihood[count] = fresh * right * c->match[count].likelihood;
+    c->likelihood[count + 1] = fresh * (1.0 - right) / (2.0 * NAV_PI);
     c->total = 0.0;
     for (int n = 0; n < count + 2; n++)
         c->total += c->likelihood[n];
@@ -104,6 +105,11 @@ static double segment_probability(const struct nav_faces *f, const struct segmen
     return c->likelihood[chosen] / (c->total + added);
 }
 
+static double segment_hits(const struct nav_touches_line *line)
+{
+    return fmin(nav_touches_count(line->used), SEGMENT_HITS);
+}
+
 static void segment_of_face(struct nav_faces *f, struct nav_face *g, struct nav_joint *j,
                             const struct nav_touches_line *line, const struct segment_match *m, double probability)
 {
@@ -112,8 +118,8 @@ static void segment_of_face(struct nav_faces *f, struct nav_face *g, struct nav_
     double turn = nav_wrap(j->mean[NAV_JOINT_HEADING] + line->normal - j->mean[g->index]);
     nav_joint_measure(j, &m->angle, -turn, line->normal_var);
     nav_face_feel(g, m->along - line->span / 2.0, m->along + line->span / 2.0);
-    g->hits += SEGMENT_HITS;
-    nav_faces_feel(f, g, j, &(struct nav_feel){line->x, line->y, m->along, known, probability, SEGMENT_HITS});
+    g->hits += segment_hits(line);
+    nav_faces_feel(f, g, j, &(struct nav_feel){line->x, line->y, m->along, known, probability, segment_hits(line)});
 }
 
 static void segment_to_axes(const struct nav_face *g, struct nav_joint *j)
@@ -138,9 +144,9 @@ static void segment_add(struct nav_faces *f, struct nav_joint *j, const struct n
     nav_linear_add(&offset, NAV_JOINT_HEADING, ny * lx - nx * ly);
     struct nav_face *g = &f->face[f->count++];
     *g = (struct nav_face){.anchor_x = m[NAV_JOINT_X] + lx, .anchor_y = m[NAV_JOINT_Y] + ly, .right = right};
-    g->hits = SEGMENT_HITS;
+    g->hits = segment_hits(line);
     g->number = f->made++;
-    nav_stretch_begin(&g->stretch, (struct nav_sighting){f->row, f->way, line->x, line->y}, SEGMENT_HITS);
+    nav_stretch_begin(&g->stretch, (struct nav_sighting){f->row, f->way, line->x, line->y}, segment_hits(line));
     g->index = nav_joint_add(j, normal, &direction, line->normal_var);
     (void)nav_joint_add(j, 0.0, &offset, line->offset_var + NAV_FACE_ROUGH_M * NAV_FACE_ROUGH_M);
     nav_face_feel(g, -line->span / 2.0, line->span / 2.0);
@@ -150,30 +156,36 @@ static void segment_add(struct nav_faces *f, struct nav_joint *j, const struct n
     nav_faces_meet(f, g, j);
 }
 
-/* Log-likelihood of the segment's contacts, over all of them as of no face. Two of them fix the line. */
+/* Log-likelihood of the segment's contacts, over all of them as of no face. Two of them fix the line, or one and its
+ * normal. */
 static double segment_score(const struct nav_touches_line *line, double total, double length)
 {
     double contacts = nav_touches_count(line->used), each = length / sqrt(2.0 * NAV_PI * line->offset_var * contacts);
-    return log(total * length * length / line->span) + (contacts - 2.0) * log(each) - contacts * log(NAV_FACES_LOOSE);
+    double fixed = contacts > 1.0 ? length * length / line->span : 2.0 * NAV_PI * length;
+    return log(total * fixed) + fmax(contacts - 2.0, 0.0) * log(each) - contacts * log(NAV_FACES_LOOSE);
 }
 
-/* The line is one of many that might have been found: it must be worth the choice of two contacts. */
+/* The line is one of many that might have been found: it must be worth the choice of two contacts. A single contact and
+ * its normal were not chosen. */
 static double segment_place(struct nav_faces *f, struct nav_joint *j, const struct nav_touches *touches,
                             const struct nav_touches_line *line, const struct nav_contact *contact, double chance)
 {
     struct segment_choice choice;
     int count = f->count;
-    segment_weigh(f, j, line, &choice);
+    bool single = nav_touches_count(line->used) == 1;
+    double fresh = nav_faces_fresh(contact);
+    segment_weigh(f, j, line, single ? fresh : NAV_FACE_NEW_PER_M, &choice);
     double score = segment_score(line, choice.total, contact->length);
-    if (score < 2.0 * log(nav_touches_count(f->loose)))
+    if (score < (single ? 0.0 : 2.0 * log(nav_touches_count(f->loose))))
         return 0.0;
     int chosen = segment_choose(&choice, count + 2, chance);
-    if (chosen >= count && nav_faces_apart(f, j, touches, line->used, contact) > score)
+    if (!single && chosen >= count && nav_faces_apart(f, j, touches, line->used, contact) > score)
         return nav_faces_drain(f, j, touches, line->used, contact, true);
     f->loose &= ~line->used;
     if (chosen < count)
         segment_of_face(f, &f->face[chosen], j, line, &choice.match[chosen],
-                        segment_probability(f, &choice, chosen, nav_faces_fresh(contact)));
+                        single ? choice.likelihood[chosen] / choice.total
+                               : segment_probability(f, &choice, chosen, fresh));
     else if (count < NAV_FACES_MOST)
         segment_add(f, j, line, chosen == count);
     return score;

@@ -117,7 +117,7 @@ static bool touches_regress(const struct nav_touches *t, uint64_t on, double nx,
     return residual < STRAIGHT * (nav_touches_count(on) - 2) && out->normal_var < ANGLE_MOST * ANGLE_MOST;
 }
 
-bool nav_touches_fit(const struct nav_touches *t, int at, uint64_t among, struct nav_touches_line *out)
+static bool touches_line(const struct nav_touches *t, int at, uint64_t among, struct nav_touches_line *out)
 {
     const struct nav_touch *a = &t->touch[at];
     double best_x = 0.0, best_y = 0.0;
@@ -138,4 +138,24 @@ bool nav_touches_fit(const struct nav_touches *t, int at, uint64_t among, struct
         }
     }
     return nav_touches_count(best) >= LEAST && touches_regress(t, best, best_x, best_y, out);
+}
+
+/* Across the contact's reported normal. */
+static bool touches_across(const struct nav_touch *a, int at, struct nav_touches_line *out)
+{
+    double variance = a->normal_var + a->turned;
+    if (isnan(a->normal) || variance >= ANGLE_MOST * ANGLE_MOST)
+        return false;
+    *out = (struct nav_touches_line){.normal = a->normal,
+                                     .x = a->x,
+                                     .y = a->y,
+                                     .normal_var = variance,
+                                     .offset_var = a->variance,
+                                     .used = 1ULL << at};
+    return true;
+}
+
+bool nav_touches_fit(const struct nav_touches *t, int at, uint64_t among, struct nav_touches_line *out)
+{
+    return touches_line(t, at, among, out) || touches_across(&t->touch[at], at, out);
 }

@@ -41,7 +41,8 @@ struct nav_touches_line {
 /* How many are in a set. */
 int nav_touches_count(uint64_t set);
 
-/* Finds the line through contact `at` that most of the contacts in `among` lie on. False: too few do. */
+/* Finds the line through contact `at` that most of the contacts in `among` lie on; where too few do, the line by the
+ * normal that was reported with the contact. False: neither is known. */
 bool nav_touches_fit(const struct nav_touches *, int at, uint64_t among, struct nav_touches_line *out);
 
 #endif

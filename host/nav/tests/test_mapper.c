@@ -6,8 +6,9 @@
 
 #include "joint.h"
 #include "near.h"
+#include "particle_map.h"
 #include "rooms.h"
-#include "touches.h"
+#include "segment.h"
 #include "wall.h"
 
 static void test_a_measurement_corrects_what_is_correlated(void **state)
@@ -30,6 +31,12 @@ static void test_a_measurement_corrects_what_is_correlated(void **state)
     assert_near(cov[NAV_JOINT_HEADING * (NAV_JOINT_FACES + 1)], 0.005, 1e-12);
 }
 
+/* Of a whisker that points ahead and reports no normal. */
+static struct nav_touch touch(double x, double y, double variance)
+{
+    return (struct nav_touch){.x = x, .y = y, .along_x = 1.0, .variance = variance, .normal = NAN};
+}
+
 static void test_contacts_in_a_row_make_a_line(void **state)
 {
     (void)state;
@@ -37,8 +44,8 @@ static void test_contacts_in_a_row_make_a_line(void **state)
     struct nav_touches_line line;
     int last = 0;
     for (int n = 0; n < 6; n++)
-        last = nav_touches_keep(&t, (struct nav_touch){.x = 0.3, .y = 0.05 * n, .along_x = 1.0, .variance = 1e-6});
-    (void)nav_touches_keep(&t, (struct nav_touch){.x = 0.2, .y = 0.1, .along_x = 1.0, .variance = 1e-6});
+        last = nav_touches_keep(&t, touch(0.3, 0.05 * n, 1e-6));
+    (void)nav_touches_keep(&t, touch(0.2, 0.1, 1e-6));
     assert_true(nav_touches_fit(&t, last, t.held, &line));
     assert_int_equal(nav_touches_count(line.used), 6);
     assert_near(fabs(nav_wrap(line.normal)), NAV_PI, 1e-9);
@@ -58,14 +65,68 @@ static void test_a_line_through_contacts_that_scatter_is_the_one_of_least_square
     int last = 0;
     for (int n = 0; n < 6; n++) {
         double y = 0.05 * n - 0.125;
-        last = nav_touches_keep(
-            &t, (struct nav_touch){.x = 0.3 + 0.1 * y + off[n], .y = y, .along_x = 1.0, .variance = 4e-6});
+        last = nav_touches_keep(&t, touch(0.3 + 0.1 * y + off[n], y, 4e-6));
         slope += y * (0.1 * y + off[n]);
         squares += y * y;
     }
     assert_true(nav_touches_fit(&t, last, t.held, &line));
     assert_int_equal(nav_touches_count(line.used), 6);
     assert_near(nav_wrap(line.normal - NAV_PI), -atan(slope / squares), 1e-4);
+}
+
+static void test_a_contact_and_its_normal_make_a_line(void **state)
+{
+    (void)state;
+    struct nav_touches t = {.held = 0};
+    struct nav_touches_line line;
+    struct nav_touch reported = touch(0.0, 0.1, 1e-6);
+    reported.normal = 3.0;
+    reported.normal_var = 0.06 * 0.06;
+    int at = nav_touches_keep(&t, reported);
+    assert_true(nav_touches_fit(&t, at, t.held, &line));
+    assert_true(line.used == 1ULL << at);
+    assert_near(line.normal, 3.0, 0.0);
+    assert_near(line.y, 0.1, 0.0);
+    assert_near(line.span, 0.0, 0.0);
+    nav_touches_move(&t, (struct nav_pose){0.0, 0.0, 0.1}, (struct nav_noise){0.0, 0.01});
+    assert_near(t.touch[at].normal, 2.9, 1e-12);
+    assert_true(nav_touches_fit(&t, at, t.held, &line));
+    assert_near(line.normal_var, 0.06 * 0.06 + 0.01, 1e-12);
+    nav_touches_move(&t, (struct nav_pose){0.0, 0.0, 0.0}, (struct nav_noise){0.0, 0.01});
+    assert_false(nav_touches_fit(&t, at, t.held, &line)); /* turned too far since */
+    at = nav_touches_keep(&t, touch(0.3, 0.1, 1e-6));
+    assert_false(nav_touches_fit(&t, at, t.held, &line));
+}
+
+/* One contact with what stands `x` m ahead, `y` m to the left, of a whisker that reports the face's normal. */
+static void feel(struct nav_particle_map *map, double x, double y, double normal)
+{
+    struct nav_touch reported = touch(x, y, 25e-6);
+    reported.normal = normal;
+    reported.normal_var = 0.05 * 0.05;
+    struct nav_contact contact = {nav_touches_keep(&map->touches, reported), 0.005, 0.2, 0.01};
+    (void)nav_faces_take(&map->faces, &map->joint, &map->touches, &contact);
+    (void)nav_segment_take(&map->faces, &map->joint, &map->touches, &contact, -1.0);
+}
+
+static void test_one_contact_and_its_normal_begin_a_face(void **state)
+{
+    (void)state;
+    struct nav_particle_map map;
+    assert_int_equal(nav_particle_map_init(&map, 1), 0);
+    feel(&map, 0.3, 0.0, NAN);
+    assert_int_equal(map.faces.count, 0);
+    feel(&map, 0.3, 0.1, NAV_PI);
+    assert_int_equal(map.faces.count, 1);
+    nav_joint_set(&map.joint, NAV_JOINT_X, 0.03, 0.05 * 0.05);
+    feel(&map, 0.3, -0.1, NAV_PI); /* the same wall, felt again: the pose was 3 cm too far ahead */
+    assert_int_equal(map.faces.count, 1);
+    assert_near(map.joint.mean[NAV_JOINT_X], 0.0, 0.002);
+    nav_joint_set(&map.joint, NAV_JOINT_X, 0.03, 0.05 * 0.05);
+    feel(&map, 0.3, -0.1, -NAV_PI / 2.0); /* a wall beside it, at right angles */
+    assert_int_equal(map.faces.count, 2);
+    assert_near(map.joint.mean[NAV_JOINT_X], 0.03, 0.002);
+    nav_particle_map_free(&map);
 }
 
 static void step(void *mapper, const struct nav_row *row, struct nav_estimate *out)
@@ -151,6 +212,8 @@ int main(void)
         cmocka_unit_test(test_a_measurement_corrects_what_is_correlated),
         cmocka_unit_test(test_contacts_in_a_row_make_a_line),
         cmocka_unit_test(test_a_line_through_contacts_that_scatter_is_the_one_of_least_squares),
+        cmocka_unit_test(test_a_contact_and_its_normal_make_a_line),
+        cmocka_unit_test(test_one_contact_and_its_normal_begin_a_face),
         cmocka_unit_test(test_a_wall_felt_again_corrects_the_pose),
         cmocka_unit_test(test_without_contacts_it_is_never_surer),
         cmocka_unit_test(test_bad_cells_are_counted_and_not_read),

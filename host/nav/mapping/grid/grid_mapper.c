@@ -146,11 +146,14 @@ static void grid_line(struct nav_grid_mapper *m, const struct nav_record_row *ro
         const struct nav_place *at = &m->rows.ray[ray].place;
         if (!(c->weight > 0.0F) || isinf(c->distance))
             continue;
-        int place = nav_touches_keep(&m->touches, (struct nav_touch){.x = at->x + (double)c->distance * at->c,
-                                                                     .y = at->y + (double)c->distance * at->s,
-                                                                     .along_x = at->c,
-                                                                     .along_y = at->s,
-                                                                     .variance = sigma * sigma});
+        int place = nav_touches_keep(&m->touches,
+                                     (struct nav_touch){.x = at->x + (double)c->distance * at->c,
+                                                        .y = at->y + (double)c->distance * at->s,
+                                                        .along_x = at->c,
+                                                        .along_y = at->s,
+                                                        .variance = sigma * sigma,
+                                                        .normal = (double)c->normal,
+                                                        .normal_var = (double)c->normal_sd * (double)c->normal_sd});
         m->loose = (m->loose | 1ULL << place) & m->touches.held;
         if (!m->rows.lined && nav_touches_fit(&m->touches, place, m->loose, &m->rows.line)) {
             m->rows.lined = true;

@@ -2,6 +2,7 @@
 const SURE_TILE = 0.8; // of a texture: below, its letter has a question mark
 const DEVIATIONS = 2; // of faces and corners, that are shown
 const BAND_LEAST = 1.5; // px, half of the band about a face
+const FACE_LEAST = 6; // px, of a stretch that was felt at one point
 const STEP_FIT_M = 0.5; // of what the plan shows, so that it seldom moves
 const NO_CELL = 255;
 const LOOPS_STRONG = 6; // the newest; older ones are as faint as
@@ -20,8 +21,9 @@ class MapLayer {
     this.pen = pen;
     if (map.grid) this.occupancy(map.grid);
     if (map.lattice) for (const tile of map.tiles) this.tile(map, tile);
-    for (const face of map.faces) this.band(face);
-    for (const face of map.faces) this.line(face);
+    const faces = map.faces.map((face) => this.visible(face));
+    for (const face of faces) this.band(face);
+    for (const face of faces) this.line(face);
     for (const corner of map.corners) this.corner(corner);
     map.loops.forEach((loop, n) => this.loop(loop, map.loops.length - 1 - n));
   }
@@ -91,6 +93,14 @@ class MapLayer {
     pen.stroke();
     const [px, py] = at(column + 0.5, row + 0.5);
     plan.text(pen, `${textures[texture]?.[0] ?? '?'}${sure >= SURE_TILE ? '' : '?'}`, px, py, '--soft', 11, 'center');
+  }
+
+  /* The stretch, long enough to be seen. */
+  visible([x0, y0, x1, y1, normal, ...rest]) {
+    const { plan } = this;
+    const more = Math.max(FACE_LEAST * (plan.ratio / plan.scale) - Math.hypot(x1 - x0, y1 - y0), 0) / 2;
+    const [ux, uy] = [-more * Math.sin(normal), more * Math.cos(normal)];
+    return [x0 - ux, y0 - uy, x1 + ux, y1 + uy, normal, ...rest];
   }
 
   /* As far to both sides as a face may be off: its offset, and, away from its middle, its direction. */
