@@ -56,7 +56,8 @@ def begun(monkeypatch, capsys, tmp_path):
     scenes.write(tmp_path / "scene", make_scene(5)[0])
 
     def said(*options) -> tuple[str, str]:
-        place = ["--out", tmp_path, "--first-port", free_port(3), "--ring", "whisker-test-robot-command"]
+        ports = ["--first-port", free_port(3), "--view-port", 0]
+        place = ["--out", tmp_path, *ports, "--ring", "whisker-test-robot-command"]
         code, out, err = run(capsys, "robot", tmp_path / "scene", "--models", tmp_path, *place, *options)
         assert code == 0, err
         return out, err
