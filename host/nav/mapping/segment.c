@@ -18,6 +18,7 @@ struct segment_match {
 struct segment_choice {
     struct segment_match match[NAV_FACES_MOST + 1];
     double likelihood[NAV_FACES_MOST + 2];
+    double fresh; /* density of faces not in the map that they are weighed by, 1 / m */
     double total;
 };
 
@@ -68,11 +69,11 @@ static void segment_match_axes(const struct nav_joint *j, const struct nav_touch
     m->likelihood = variance > AXES_KNOWN ? 2.0 / NAV_PI : nav_face_normal_density(m->turn, variance) / 4.0;
 }
 
-/* fresh: density of faces not in the map, 1 / m. */
 static void segment_weigh(const struct nav_faces *f, const struct nav_joint *j, const struct nav_touches_line *line,
                           double fresh, struct segment_choice *c)
 {
     int count = f->count;
+    c->fresh = fresh;
     double right = f->right / (f->right + f->refused);
     for (int n = 0; n < count; n++) {
         segment_match_face(&f->face[n], j, line, &c->match[n]);
@@ -101,7 +102,7 @@ static int segment_choose(const struct segment_choice *c, int count, double chan
 /* Probability of the chosen face, for a closure: faces not in the map are as dense as contacts with them are. */
 static double segment_probability(const struct nav_faces *f, const struct segment_choice *c, int chosen, double fresh)
 {
-    double added = (fresh / NAV_FACE_NEW_PER_M - 1.0) * (c->likelihood[f->count] + c->likelihood[f->count + 1]);
+    double added = (fresh / c->fresh - 1.0) * (c->likelihood[f->count] + c->likelihood[f->count + 1]);
     return c->likelihood[chosen] / (c->total + added);
 }
 
@@ -184,8 +185,7 @@ static double segment_place(struct nav_faces *f, struct nav_joint *j, const stru
     f->loose &= ~line->used;
     if (chosen < count)
         segment_of_face(f, &f->face[chosen], j, line, &choice.match[chosen],
-                        single ? choice.likelihood[chosen] / choice.total
-                               : segment_probability(f, &choice, chosen, fresh));
+                        segment_probability(f, &choice, chosen, fresh));
     else if (count < NAV_FACES_MOST)
         segment_add(f, j, line, chosen == count);
     return score;

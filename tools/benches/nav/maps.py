@@ -1,4 +1,4 @@
-"""Maps by touch alone with defaults: families of scenes, with normals, with a gyroscope, hard worlds; error against cost by hypotheses.
+"""Maps by touch alone with defaults: families, with normals, with a gyroscope, hard worlds; error against cost.
 
 .venv/bin/python tools/benches map [--seeds N] [--workers N]
 
