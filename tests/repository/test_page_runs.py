@@ -57,6 +57,7 @@ ON_FILES = {
     "whisker flash firmware/images/mlx90333/node.whex": "no bridge is connected",
     "whisker flash firmware/images/mlx90333/node.whex --dry-run": "no bridge is connected",
     "whisker scene make --family anchor --seed 500 --steps 3000 --out scenes/500": "scenes/500: anchor, seed 500",
+    "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --desktop --units units": "whisker-robot.target; next: ",
     "whisker map scenes/500 --out maps/touch": "faces: ",
     "whisker bench map maps/touch maps/mine --scene scenes/500": "maps/mine",
     "whisker bench touch --scene anchor+global --estimate est.csv": "sure and wrong",
@@ -82,14 +83,13 @@ WITH_BRIDGE = {
     "whisker replay drive.mcap --ring replayed --speed 2": "frames",
     "whisker-view --open": FOREVER,
 }
-# What a command prints that ends without hardware, or waits for it until Ctrl-C.
+# What a command prints that ends without hardware, or waits for it until Ctrl-C, which may come while it ends.
 WITHOUT_HARDWARE = {
     "whisker bridge-sim --mechanics modes": "is up",
     "whisker bridge-sim --usbip": "the bridge is served by usbip",
     "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --create 1": "starting whiskerd, base, pilot",
     "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --create 1 --desktop": "starting navigator, bag, view, ",
     "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --desktop": "starting navigator, bag, view, ",
-    "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --desktop --units units": "whisker-robot.target; next: ",
     "whisker robot SCENE --models MODELS --no-daemon": "starting base, pilot",
     "whisker robot scenes/mine --models models --port /dev/ttyUSB0 --create 1 --desktop --out run1": "starting navigator, ",
     "whisker-base --help": "--socket PATH",
