@@ -296,7 +296,7 @@ static void kalman_update(void *self, const struct nav_evidence *evidence)
     if (!k->linearise)
         return;
     memcpy(k->weight, evidence->weight, (size_t)k->likelihood->sensors.first[1] * sizeof *k->weight);
-    nav_likelihood_read(k->likelihood, &(struct nav_evidence){evidence->reading, k->weight});
+    nav_likelihood_read(k->likelihood, &(struct nav_evidence){evidence->reading, k->weight, evidence->track});
     nav_kalman_take(k, evidence);
 }
 

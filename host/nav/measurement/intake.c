@@ -129,7 +129,7 @@ bool nav_intake_take(struct nav_intake *in, const struct nav_row *row, struct na
                      struct nav_evidence *evidence)
 {
     *motion = (struct nav_motion){.unknown_m = 0.0};
-    *evidence = (struct nav_evidence){.reading = in->reading, .weight = in->weight};
+    *evidence = (struct nav_evidence){.reading = in->reading, .weight = in->weight, .track = in->track};
     enum arrival arrival = intake_arrival_of(in, row->t_s);
     if (arrival != ON_TIME)
         in->bad_rows++;

@@ -87,6 +87,7 @@ void nav_likelihood_read(struct nav_likelihood *l, const struct nav_evidence *ev
     l->ceiling = 0.0;
     l->reads = 0;
     l->reading = evidence->reading;
+    l->track = evidence->track;
     for (int k = 0; k < NAV_KINDS; k++) {
         l->active[k] = false;
         for (int w = l->sensors.first[k]; w < l->sensors.first[k + 1]; w++) {

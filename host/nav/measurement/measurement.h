@@ -47,8 +47,9 @@ struct nav_model {
 
 /* How the readings of a sensor went so far. */
 struct nav_track {
-    double moved;  /* path of the sensor since its last reading that counted, m */
-    bool touching; /* what that reading was, of an object whisker */
+    double moved;    /* path of the sensor since its last reading that counted, m */
+    bool touching;   /* what that reading was, of an object whisker */
+    double expected; /* share of the belief that expected the best class of that reading, of a texture whisker */
 };
 
 enum nav_check { NAV_READ, NAV_NOT_READ, NAV_EMPTY, NAV_BAD };

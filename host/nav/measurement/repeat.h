@@ -3,8 +3,10 @@
  * Where a whisker's windows err one by one, two that agree are twice the evidence; where they err in runs (a caught
  * whisker, a classifier that is wrong about a patch), the second says little. Runs can be seen without knowing where
  * the robot is: a class said for less than half a tile's path, between two runs of another class that are no shorter,
- * was most likely wrong, and how errors repeat follows from the share of such windows that are followed by another one:
- * after the first, the second and any later window of a run apart, since a caught whisker stays caught. */
+ * was most likely wrong, or it is a tile that was crossed near a corner. A belief of where the robot is can tell the
+ * two apart: such a run counts as wrong but for the share of the belief that expected its class. How errors repeat
+ * follows from the share of wrong windows that are followed by another one: after the first, the second and any later
+ * window of a run apart, since a caught whisker stays caught. */
 #ifndef NAV_REPEAT_H
 #define NAV_REPEAT_H
 
@@ -14,9 +16,10 @@ enum { NAV_REPEAT_PLACES = 3 };
 
 /* Windows in a row that say the same. */
 struct nav_repeat_run {
-    int said;     /* class; -1: none */
-    double count; /* windows */
-    double path;  /* m that the tip moved in them */
+    int said;        /* class; -1: none */
+    double count;    /* windows */
+    double path;     /* m that the tip moved in them */
+    double expected; /* windows: sum of the belief that expected them */
 };
 
 struct nav_repeat {
@@ -31,9 +34,10 @@ struct nav_repeat {
 int nav_repeat_init(struct nav_repeat *, int tips, int classes, double tile);
 void nav_repeat_free(struct nav_repeat *);
 
-/* Takes a window's best class after the tip has moved so far since its last one. Returns the share of it that is new:
- * 1 for another class than before. For the same class, how much a wrong tip's saying it again is surprising, -log P,
- * by how surprising it is the first time: p. 1 where errors are independent. */
-double nav_repeat_take(struct nav_repeat *, int tip, int said, double moved);
+/* Takes a window's best class after the tip has moved so far since its last one. expected: the share of the belief, 0
+ * to 1, that expected the best class of that last window. Returns the share of the window that is new: 1 for another
+ * class than before. For the same class, how much a wrong tip's saying it again is surprising, -log P, by how
+ * surprising it is the first time: p. 1 where errors are independent. */
+double nav_repeat_take(struct nav_repeat *, int tip, int said, double moved, double expected);
 
 #endif

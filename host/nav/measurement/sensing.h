@@ -68,6 +68,7 @@ struct nav_likelihood {
     uint8_t *scratch;             /* [whiskers] */
     struct nav_trust *trust;      /* [whiskers], see trust.h */
     const double *const *reading; /* [whiskers] of the row last read */
+    struct nav_track *track;      /* [whiskers] likewise, or NULL */
     struct nav_map_belief map;    /* what is expected follows it */
 };
 

@@ -80,7 +80,9 @@ static double texture_novelty(const struct nav_model *model, struct nav_track *t
         return weight;
     for (int k = 1; k < model->values; k++)
         best = loglik[k] > loglik[best] ? k : best;
-    return fmin(weight, nav_repeat_take(repeat, model->index, best, track->moved));
+    double expected = track->expected;
+    track->expected = 0.0;
+    return fmin(weight, nav_repeat_take(repeat, model->index, best, track->moved, expected));
 }
 
 static bool texture_sharp(const double *reading)

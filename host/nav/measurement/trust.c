@@ -62,21 +62,29 @@ static void trust_judge(struct nav_trust *t, double evidence, double weight)
     t->working = fmin(fmax(t->working, WORKING_LEAST), WORKING_MOST);
 }
 
+/* Belief that expected the code which suits the reading best. */
+static double trust_expected(const struct nav_likelihood *l, int w)
+{
+    int best = 0;
+    for (int k = 1; k < l->trust[w].codes - 1; k++)
+        best = l->ratio[w][k] > l->ratio[w][best] ? k : best;
+    return l->trust[w].predicted[best];
+}
+
 static void trust_learn_accuracy(struct nav_likelihood *l, int w)
 {
     struct nav_model *model = &l->model[w];
-    int best = 0;
     double known = 0.0;
-    for (int k = 0; k < model->codes - 1; k++) {
-        best = l->ratio[w][k] > l->ratio[w][best] ? k : best;
+    for (int k = 0; k < model->codes - 1; k++)
         known += l->trust[w].predicted[k];
-    }
-    double agree = l->trust[w].predicted[best] - known * model->accuracy;
+    double agree = trust_expected(l, w) - known * model->accuracy;
     model->accuracy = fmin(fmax(model->accuracy + LEARN * l->weight[w] * agree, 1.0 / (model->codes - 1)), 0.99);
 }
 
 void nav_trust_learn(struct nav_likelihood *l)
 {
+    for (int n = 0; l->track && n < l->reads; n++)
+        l->track[l->read[n]].expected = trust_expected(l, l->read[n]);
     if (l->whiskers == 0 || l->model[0].settings->trust.learn < 0.5)
         return;
     double together = 0.0;

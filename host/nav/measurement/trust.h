@@ -4,7 +4,8 @@
  * row, what its belief expects (nav_trust_begin, nav_trust_add for poses of that belief), then lets the row's readings
  * be judged (nav_trust_learn). Belief not listed counts as expecting nothing in particular, so that an unsure filter
  * teaches nothing. A disagreement counts against a whisker only while the other whiskers agree with the belief: when
- * all disagree it is the belief that is wrong. The next row's tables use the outcome. */
+ * all disagree it is the belief that is wrong. The next row's tables use the outcome. How much of the belief expected a
+ * reading is noted for repeat.h. */
 #ifndef NAV_TRUST_H
 #define NAV_TRUST_H
 

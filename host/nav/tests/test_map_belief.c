@@ -24,7 +24,7 @@ static double read_at(struct nav_likelihood *l, const struct nav_place *at, int 
     texture[0] = said == 1 ? -10.0 : 0.0;
     texture[1] = said == 1 ? 0.0 : -10.0;
     contact = distance;
-    nav_likelihood_read(l, &(struct nav_evidence){reading, weight});
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = weight});
     return (double)nav_likelihood_at(l, at, l->scratch);
 }
 

@@ -141,18 +141,18 @@ static void whiskers_add_and_those_not_read_say_nothing(void **state)
     expect(l, (struct nav_pose){0.8503, 0.6, 0.0}, codes);
     assert_int_equal(codes[0], 0);
     assert_int_equal(codes[1], (int)floor(0.0997 / l->model[1].step));
-    nav_likelihood_read(l, &(struct nav_evidence){reading, both});
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = both});
     float all = nav_likelihood_of(l, codes);
-    nav_likelihood_read(l, &(struct nav_evidence){reading, one});
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = one});
     float texture_only = nav_likelihood_of(l, codes);
     double ratio[256];
     l->model[1].kind->fill(&l->model[1], &distance, ratio);
     double trust = l->trust[1].working, radial = log(trust * ratio[codes[1]] + 1.0 - trust);
     assert_near((double)all, (double)texture_only + radial, 1e-5);
     const double half[] = {0.0, 0.5};
-    nav_likelihood_read(l, &(struct nav_evidence){reading, half});
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = half});
     assert_near((double)nav_likelihood_of(l, codes), 0.5 * radial, 1e-5);
-    nav_likelihood_read(l, &(struct nav_evidence){reading, none});
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = none});
     assert_near((double)nav_likelihood_of(l, codes), 0.0, 0.0);
     nav_likelihood_free(l);
 }
@@ -228,7 +228,7 @@ static void a_signature_is_worked_out_once_relative_to_the_best(void **state)
     const double texture[] = {0.0, -50.0}, distance = 0.1;
     const double *reading[] = {texture, &distance};
     const double both[] = {1.0, 1.0};
-    nav_likelihood_read(l, &(struct nav_evidence){reading, both});
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = both});
     nav_expected_begin(e, (const float *const *)l->table, 0.0f);
     nav_expected_scale(e);
     assert_in_range(e->signatures, 5, 200);
@@ -260,7 +260,7 @@ static void an_own_sensor_weighs_poses_by_its_table(void **state)
     const double *reading[] = {loglik};
     const double one = 1.0;
     l->trust[0].working = 1.0;
-    nav_likelihood_read(l, &(struct nav_evidence){reading, &one});
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = &one});
     double reported[4];
     for (int k = 0; k < 4; k++)
         reported[k] = exp((double)l->table[0][k]);
@@ -325,7 +325,7 @@ static void a_robot_with_one_whisker_is_weighed_by_its_codes(void **state)
     struct nav_expected *e = nav_expected_new(l, 0.05, 8, 1, 1);
     const double distance = 0.1, one = 1.0;
     const double *reading[] = {&distance};
-    nav_likelihood_read(l, &(struct nav_evidence){reading, &one});
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = &one});
     nav_expected_begin(e, (const float *const *)l->table, 0.0f);
     nav_expected_scale(e);
     assert_in_range(e->signatures, 5, 200);
@@ -358,7 +358,7 @@ static void many_whiskers_do_not_underflow(void **state)
     struct nav_expected *e = nav_expected_new(l, 0.1, 4, 1, 1);
     for (int w = 0; w < WHISKERS; w++)
         l->trust[w].working = 1.0;
-    nav_likelihood_read(l, &(struct nav_evidence){reading, weights});
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = weights});
     nav_expected_begin(e, (const float *const *)l->table, 0.0f);
     nav_expected_scale(e);
     assert_int_equal(e->signatures, 3);

@@ -81,6 +81,7 @@ static void a_window_that_says_nothing_changes_nothing(void **state)
 struct bench {
     struct nav_likelihood *likelihood;
     uint8_t codes[3];
+    struct nav_track *track;
 };
 
 static const struct nav_tip TIPS[] = {{0.1, 0.1}, {0.1, -0.1}};
@@ -103,7 +104,7 @@ static void read_row(struct bench *b, bool left_agrees, bool right_agrees, doubl
 {
     const double right[] = {0.0, -10.0}, wrong[] = {-10.0, 0.0}, none = (double)INFINITY, weight[] = {1.0, 1.0, 1.0};
     const double *reading[] = {left_agrees ? right : wrong, right_agrees ? right : wrong, &none};
-    nav_likelihood_read(b->likelihood, &(struct nav_evidence){reading, weight});
+    nav_likelihood_read(b->likelihood, &(struct nav_evidence){reading, weight, b->track});
     nav_trust_begin(b->likelihood);
     nav_trust_add(b->likelihood, b->codes, mass);
     nav_trust_learn(b->likelihood);
@@ -150,6 +151,18 @@ static void an_unsure_belief_teaches_nothing(void **state)
     nav_likelihood_free(b.likelihood);
 }
 
+static void what_was_expected_of_a_reading_is_noted(void **state)
+{
+    (void)state;
+    struct bench b = bench();
+    struct nav_track track[3] = {{.expected = 0.0}};
+    b.track = track;
+    read_row(&b, true, false, 0.75);
+    assert_near(track[0].expected, 0.75, 0.0);
+    assert_near(track[1].expected, 0.0, 0.0); /* all of the belief expected the other class */
+    nav_likelihood_free(b.likelihood);
+}
+
 static void a_lone_whisker_is_always_heard(void **state)
 {
     (void)state;
@@ -160,7 +173,7 @@ static void a_lone_whisker_is_always_heard(void **state)
     const double *reading[] = {wrong};
     const uint8_t codes[] = {0};
     for (int i = 0; i < 100; i++) {
-        nav_likelihood_read(l, &(struct nav_evidence){reading, weight});
+        nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = weight});
         nav_trust_begin(l);
         nav_trust_add(l, codes, 1.0);
         nav_trust_learn(l);
@@ -177,7 +190,7 @@ static void an_object_whisker_that_feels_nothing_where_walls_are_is_found_out(vo
     const double *reading[] = {right, right, &none};
     b.codes[2] = 4;
     for (int i = 0; i < 10; i++) {
-        nav_likelihood_read(b.likelihood, &(struct nav_evidence){reading, weight});
+        nav_likelihood_read(b.likelihood, &(struct nav_evidence){.reading = reading, .weight = weight});
         nav_trust_begin(b.likelihood);
         nav_trust_add(b.likelihood, b.codes, 1.0);
         nav_trust_learn(b.likelihood);
@@ -196,6 +209,7 @@ int main(void)
         cmocka_unit_test(a_whisker_that_keeps_disagreeing_is_no_longer_heard),
         cmocka_unit_test(when_all_disagree_it_is_the_belief_that_is_wrong),
         cmocka_unit_test(an_unsure_belief_teaches_nothing),
+        cmocka_unit_test(what_was_expected_of_a_reading_is_noted),
         cmocka_unit_test(a_lone_whisker_is_always_heard),
         cmocka_unit_test(an_object_whisker_that_feels_nothing_where_walls_are_is_found_out),
     };

@@ -34,7 +34,7 @@ static double carried_read(struct carried *c, int said)
     const double *reading[WANDER_TIPS + WANDER_RAYS] = {window};
     for (int k = 0; k < WANDER_CLASSES; k++)
         window[k] = k == said ? 0.0 : -20.0;
-    const struct nav_evidence evidence = {reading, weight};
+    const struct nav_evidence evidence = {.reading = reading, .weight = weight};
     nav_likelihood_read(c->likelihood, &evidence);
     return adaptive_gaussian_take(&c->g, &STILL, &evidence, 1.0);
 }

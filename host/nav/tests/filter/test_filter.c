@@ -75,6 +75,34 @@ static void a_repetition_counts_less_at_any_distance(void **state)
     nav_intake_free(&in);
 }
 
+/* Weight of a repetition after many short runs of another class, which a belief expected or not. */
+static double weight_after_runs(double expected)
+{
+    struct nav_problem p = room();
+    p.settings.texture.spacing_m = 0.001;
+    struct nav_intake in;
+    nav_intake_init(&in, &p);
+    const double nan = NAN;
+    double weight = 0.0;
+    for (int k = 0; k < 995; k++) { /* up to the second window of a run */
+        struct nav_row row = row_at(0.1 * k, k % 10 < 3 ? OTHER : READ, &nan);
+        struct nav_motion motion;
+        struct nav_evidence evidence;
+        assert_true(nav_intake_take(&in, &row, &motion, &evidence));
+        weight = evidence.weight[0];
+        evidence.track[0].expected = expected;
+    }
+    nav_intake_free(&in);
+    return weight;
+}
+
+static void runs_that_the_belief_expected_are_no_errors(void **state)
+{
+    (void)state;
+    double errors = weight_after_runs(0.0), tiles = weight_after_runs(1.0);
+    assert_true(errors < 0.5 * tiles);
+}
+
 static void turning_moves_a_whisker_by_its_lever(void **state)
 {
     (void)state;
@@ -351,6 +379,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(readings_count_by_how_far_the_whisker_has_moved),
         cmocka_unit_test(a_repetition_counts_less_at_any_distance),
+        cmocka_unit_test(runs_that_the_belief_expected_are_no_errors),
         cmocka_unit_test(turning_moves_a_whisker_by_its_lever),
         cmocka_unit_test(bad_cells_are_counted_and_not_read),
         cmocka_unit_test(a_window_that_favours_no_texture_is_not_read),

@@ -38,7 +38,7 @@ static void nothing_read_keeps_the_mode_and_fits_the_clipped_prior(void **state)
     p.settings.foveal.quantum_m = 0.01;
     struct foveal *f = foveal_create(&p);
     const double none[] = {0.0, 0.0};
-    foveal_update(f, &(struct nav_evidence){NULL, none});
+    foveal_update(f, &(struct nav_evidence){.reading = NULL, .weight = none});
     assert_near(f->belief.mean.x, 0.36, 1e-12);
     /* A Gaussian of 0.03 m sampled every 0.025 m keeps its variance; the quantisation term is added (equation 7). */
     assert_near(f->belief.covariance[0], 0.0009 + 0.0001, 2e-5);
@@ -56,7 +56,7 @@ static void a_texture_moves_the_mode_to_the_nearest_point_that_fits(void **state
     struct foveal *f = foveal_create(&p);
     const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
     const double *reading[] = {right_tile, NULL};
-    foveal_update(f, &(struct nav_evidence){reading, weight});
+    foveal_update(f, &(struct nav_evidence){.reading = reading, .weight = weight});
     /* Tip 0.1 ahead, border at 0.5: the centre is at 0.4 or beyond; points lie at 0.36, 0.385, 0.41. */
     assert_near(f->belief.mean.x, 0.41, 1e-12);
     assert_near(f->belief.mean.y, 0.25, 1e-12);
@@ -73,7 +73,7 @@ static void it_never_looks_outside_the_fovea(void **state)
     struct foveal *f = foveal_create(&p);
     const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
     const double *reading[] = {right_tile, NULL};
-    foveal_update(f, &(struct nav_evidence){reading, weight});
+    foveal_update(f, &(struct nav_evidence){.reading = reading, .weight = weight});
     assert_near(f->belief.mean.x, 0.2, 0.126);
     foveal_destroy(f);
 }
@@ -86,7 +86,7 @@ static void a_fovea_wholly_inside_a_solid_changes_nothing(void **state)
     struct foveal *f = foveal_create(&p);
     const double right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
     const double *reading[] = {right_tile, NULL};
-    foveal_update(f, &(struct nav_evidence){reading, weight});
+    foveal_update(f, &(struct nav_evidence){.reading = reading, .weight = weight});
     assert_near(f->belief.mean.x, 5.0, 0.0);
     assert_near(f->belief.covariance[0], 0.01, 1e-12);
     foveal_destroy(f);
@@ -99,7 +99,7 @@ static void covariance_after(struct nav_problem *p, bool right, double covarianc
     struct foveal *f = foveal_create(p);
     const double left_tile[] = {0.0, -50.0}, right_tile[] = {-50.0, 0.0}, weight[] = {1.0, 0.0};
     const double *reading[] = {right ? right_tile : left_tile, NULL};
-    foveal_update(f, &(struct nav_evidence){reading, weight});
+    foveal_update(f, &(struct nav_evidence){.reading = reading, .weight = weight});
     memcpy(covariance, f->belief.covariance, sizeof f->belief.covariance);
     foveal_destroy(f);
 }

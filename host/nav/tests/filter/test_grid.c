@@ -148,7 +148,7 @@ static void the_grid_is_equation_4(void **state)
     for (int row = 0; row < 3; row++) {
         const double *reading[] = {windows[row], &distances[row]};
         grid_predict(g, &motion);
-        grid_update(g, &(struct nav_evidence){reading, fresh});
+        grid_update(g, &(struct nav_evidence){.reading = reading, .weight = fresh});
         by_heading(g, fast);
         naive_step(&p, g->likelihood, naive, share, turn);
         assert_near(total_variation(naive, fast), 0.0, 1e-6);
@@ -221,7 +221,7 @@ static void an_arena_without_a_free_place_is_survived(void **state)
     const double *reading[] = {nothing, &distance};
     struct nav_estimate out;
     for (int i = 0; i < 3; i++)
-        grid_update(g, &(struct nav_evidence){reading, weight});
+        grid_update(g, &(struct nav_evidence){.reading = reading, .weight = weight});
     grid_estimate(g, &out);
     assert_true(isfinite(out.pose.x) && out.covariance[0] > 0.05 && out.confidence <= 0.0);
     grid_destroy(g);
@@ -236,7 +236,7 @@ static void a_wall_felt_ahead_puts_the_robot_before_it(void **state)
     struct grid *g = grid_create(&p);
     const double nothing[] = {0.0, 0.0}, distance = 0.1, weight[] = {0.0, 1.0};
     const double *reading[] = {nothing, &distance};
-    grid_update(g, &(struct nav_evidence){reading, weight});
+    grid_update(g, &(struct nav_evidence){.reading = reading, .weight = weight});
     struct nav_estimate out;
     grid_estimate(g, &out);
     /* Base 0.05 ahead of the centre, contact 0.1 further on, wall at 1: x = 0.85. The prior pulls it a little back. */
@@ -262,7 +262,7 @@ static void a_floor_whisker_that_lies_is_found_out_whichever_way_the_robot_faces
         struct grid *g = grid_create(&p);
         for (int row = 0; row < 40; row++) {
             const double *reading[] = {row % 2 ? wrong : right, right, &nothing};
-            grid_update(g, &(struct nav_evidence){reading, weight});
+            grid_update(g, &(struct nav_evidence){.reading = reading, .weight = weight});
         }
         assert_true(g->likelihood->trust[0].working < 0.1 && g->likelihood->trust[1].working > 0.9);
         grid_destroy(g);
@@ -309,7 +309,7 @@ static void a_cells_likelihood_is_the_mean_of_its_sub_poses_where_they_now_are(v
     }
     g->histogram.uniform = true;
     g->histogram.now.rotation = 0.3;
-    grid_update(g, &(struct nav_evidence){reading, weight});
+    grid_update(g, &(struct nav_evidence){.reading = reading, .weight = weight});
     double all = 0.0, worst = 0.0;
     static double belief[CELLS];
     by_heading(g, belief);

@@ -22,7 +22,7 @@ static struct nav_problem facing_wall(void)
 static void read_distance(struct nav_kalman *k, double distance)
 {
     const double *reading[] = {NULL, &distance};
-    kalman_update(k, &(struct nav_evidence){reading, RAY_READ});
+    kalman_update(k, &(struct nav_evidence){.reading = reading, .weight = RAY_READ});
 }
 
 /* One window that says texture `is` with certainty. */
@@ -30,7 +30,7 @@ static void read_texture(struct nav_kalman *k, int is)
 {
     const double loglik[] = {is == 0 ? 0.0 : -50.0, is == 1 ? 0.0 : -50.0};
     const double *reading[] = {loglik, NULL};
-    kalman_update(k, &(struct nav_evidence){reading, TIP_READ});
+    kalman_update(k, &(struct nav_evidence){.reading = reading, .weight = TIP_READ});
 }
 
 static void drive(struct nav_kalman *k, double metres)
@@ -280,7 +280,7 @@ static void nothing_read_changes_nothing(void **state)
     struct nav_problem p = facing_wall();
     struct nav_kalman *k = kalman_create_unscented(&p);
     struct nav_gaussian before = k->belief;
-    kalman_update(k, &(struct nav_evidence){NULL, NOTHING_READ});
+    kalman_update(k, &(struct nav_evidence){.reading = NULL, .weight = NOTHING_READ});
     assert_memory_equal(&before, &k->belief, sizeof before);
     assert_int_equal(k->evaluations, 0);
     kalman_destroy(k);

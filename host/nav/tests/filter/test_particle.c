@@ -92,7 +92,7 @@ static void standing_weighs_as_the_codes_do_where_the_robot_can_stand(void **sta
     int blocked = 0;
     for (int n = 0; n < 4000; n++) {
         const double *reading[] = {texture, n % 4 == 3 ? &nothing : &distance};
-        nav_likelihood_read(l, &(struct nav_evidence){reading, weights[n % 4]});
+        nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = weights[n % 4]});
         struct nav_pose at = {1.2 * nav_rng_uniform(&rng) - 0.1, 1.2 * nav_rng_uniform(&rng) - 0.1,
                               7.0 * nav_rng_uniform(&rng)};
         const struct nav_place place = {at.x, at.y, cos(at.theta), sin(at.theta)};
@@ -231,7 +231,7 @@ static void contradict(struct particle *f, double distance)
     const double texture[] = {-50.0, 0.0};
     const double *reading[] = {texture, &distance};
     particle_predict(f, &(struct nav_motion){.unknown_m = 0.0});
-    particle_update(f, &(struct nav_evidence){reading, BOTH});
+    particle_update(f, &(struct nav_evidence){.reading = reading, .weight = BOTH});
 }
 
 static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void **state)
@@ -246,7 +246,7 @@ static void weights_that_stay_low_bring_fresh_particles_where_the_row_fits(void 
     const double *fits[] = {texture, &nothing};
     for (int n = 0; n < 50; n++) {
         particle_predict(f, &(struct nav_motion){.unknown_m = 0.0});
-        particle_update(f, &(struct nav_evidence){fits, BOTH});
+        particle_update(f, &(struct nav_evidence){.reading = fits, .weight = BOTH});
         assert_int_equal(f->weighed, 2000); /* none injected */
     }
     double before = f->slow;
@@ -273,7 +273,7 @@ static void the_work_reported_counts_particles_weighed_and_particles_moved(void 
     particle_predict(f, &(struct nav_motion){.step = {0.01, 0.0, 0.0}});
     particle_estimate(f, &e);
     assert_int_equal(e.touched, 0); /* put off */
-    particle_update(f, &(struct nav_evidence){reading, none});
+    particle_update(f, &(struct nav_evidence){.reading = reading, .weight = none});
     particle_estimate(f, &e);
     assert_int_equal(e.evaluations, 100);
     assert_int_equal(e.touched, 200);
@@ -316,7 +316,7 @@ static void weights_never_become_more_uneven_than_allowed(void **state)
     const double *reading[] = {texture, &nothing};
     for (int n = 0; n < 30; n++) {
         particle_predict(f, &(struct nav_motion){.step = {0.02, 0.0, 0.1}});
-        particle_update(f, &(struct nav_evidence){reading, BOTH});
+        particle_update(f, &(struct nav_evidence){.reading = reading, .weight = BOTH});
         assert_true(nav_particles_effective(&f->cloud) >= 0.5 * (double)f->cloud.count);
     }
     assert_true(f->cloud.count < 10000); /* half the room has been ruled out: fewer are needed */
