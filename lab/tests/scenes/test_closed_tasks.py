@@ -8,7 +8,7 @@ from crunchbot.scene import Arena
 from crunchbot_lab.scenes.closed import Loop
 from crunchbot_lab.scenes.tasks import CheckLoop, MapLoop, mapping, reachable, share_visited
 
-SEEDS, TWO_MINUTES = range(500, 506), 1200
+SEEDS, TWO_MINUTES = range(500, 518), 1200  # the mean of six seeds varies by 0.06
 
 
 def as_it_is(loop, random):
