@@ -10,7 +10,7 @@
 struct nav_evidence {
     const double *const *reading; /* [sensors] -> doubles, as the sensor's model reads them */
     const double *weight;         /* [sensors] 0: not read or nothing new; up to 1 */
-    struct nav_track *track;      /* [sensors] nav_trust_learn notes there what was expected; NULL: nobody asks */
+    struct nav_track *track;      /* [sensors] nav_trust_learn notes there what was expected; NULL: not noted */
 };
 
 /* blur_m: standard deviation of a contact's distance over the poses that one look-up stands for. NULL: no memory. */

@@ -43,8 +43,8 @@ static double repeat_share_of_same(const struct nav_repeat *r, double count)
     return log(fmin(fmax(repeat_again_after(r, count), wrong), REPEAT_MOST)) / log(wrong);
 }
 
-/* Counts the middle run as wrong once the last is as long, but for the part that the belief expected, and makes one
- * run of all three. */
+/* Once the last run is as long as the middle one: counts the middle one as wrong, by the share of the belief that did
+ * not expect it, and makes one run of all three. */
 static void repeat_judge(struct nav_repeat *r, struct nav_repeat_run run[3])
 {
     bool between = run[0].said == run[2].said && run[1].said >= 0 && run[1].path <= r->path_most;

@@ -3,8 +3,8 @@
  * Where a whisker's windows err one by one, two that agree are twice the evidence; where they err in runs (a caught
  * whisker, a classifier that is wrong about a patch), the second says little. Runs can be seen without knowing where
  * the robot is: a class said for less than half a tile's path, between two runs of another class that are no shorter,
- * was most likely wrong, or it is a tile that was crossed near a corner. A belief of where the robot is can tell the
- * two apart: such a run counts as wrong but for the share of the belief that expected its class. How errors repeat
+ * was most likely wrong, or it is a tile that was crossed near a corner. The belief of where the robot is tells the
+ * two apart: the run counts as wrong by the share of the belief that did not expect its class. How errors repeat
  * follows from the share of wrong windows that are followed by another one: after the first, the second and any later
  * window of a run apart, since a caught whisker stays caught. */
 #ifndef NAV_REPEAT_H

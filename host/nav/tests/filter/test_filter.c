@@ -90,6 +90,7 @@ static double weight_after_runs(double expected)
         struct nav_evidence evidence;
         assert_true(nav_intake_take(&in, &row, &motion, &evidence));
         weight = evidence.weight[0];
+        assert_near(evidence.track[0].expected, 0.0, 0.0); /* of the row before: it counts once */
         evidence.track[0].expected = expected;
     }
     nav_intake_free(&in);
