@@ -51,6 +51,7 @@ int whisker_gateware_fits(const struct whisker_gateware *image, const struct whi
 #define PAGE 256u
 #define ADDRESS_END (1u << 24) /* of three bytes of address */
 #define POLLS_MAX 4000         /* of at least 0.25 ms each: an erase takes 0.4 s at most */
+#define TRIES 3                /* of an order whose transfers failed */
 #define ERASED 0xFF
 #define PREAMBLE_BYTES 4
 #define PREAMBLE_END 512u /* a bitstream's text before its preamble is shorter */
@@ -71,20 +72,46 @@ struct writing {
     void *context;
 };
 
-/* Gives the flash an order and waits for its end; `data`, UNIT bytes, is what it writes, or what came. */
-static int gateware_order(struct whisker_device *device, uint8_t command, uint32_t address, uint8_t *data)
+/* Waits for the end of what the flash is at; `report` then holds what came. */
+static int gateware_await(struct whisker_device *device, uint8_t report[WHISKER_REPORT_FLASH_BYTES])
 {
-    uint8_t report[WHISKER_REPORT_FLASH_BYTES] = {WHISKER_REPORT_ID_FLASH};
-    report[WHISKER_REPORT_FLASH_WIRE_VERSION] = WHISKER_WIRE_VERSION;
-    report[WHISKER_REPORT_FLASH_COMMAND] = command;
-    whisker_put_u32(report + WHISKER_REPORT_FLASH_ADDRESS, address);
-    memcpy(report + WHISKER_REPORT_FLASH_DATA, data, UNIT);
-    int error = device_send_flash(device, report);
+    int error = WHISKER_OK;
     report[WHISKER_REPORT_FLASH_BUSY] = 1;
     for (int i = 0; !error && report[WHISKER_REPORT_FLASH_BUSY]; i++) {
         error = i < POLLS_MAX ? device_flash(device, report) : WHISKER_ERROR_FLASH_BUSY;
     }
-    memcpy(data, report + WHISKER_REPORT_FLASH_DATA, UNIT);
+    return error;
+}
+
+/* Gives the flash an order and waits for its end. */
+static int gateware_try(struct whisker_device *device, uint8_t command, uint32_t address, const uint8_t *data,
+                        uint8_t report[WHISKER_REPORT_FLASH_BYTES])
+{
+    memset(report, 0, WHISKER_REPORT_FLASH_BYTES);
+    report[0] = WHISKER_REPORT_ID_FLASH;
+    report[WHISKER_REPORT_FLASH_WIRE_VERSION] = WHISKER_WIRE_VERSION;
+    report[WHISKER_REPORT_FLASH_COMMAND] = command;
+    whisker_put_u32(report + WHISKER_REPORT_FLASH_ADDRESS, address);
+    memcpy(report + WHISKER_REPORT_FLASH_DATA, data, UNIT);
+    const int error = device_send_flash(device, report);
+    return error ? error : gateware_await(device, report);
+}
+
+/* The same; `data`, UNIT bytes, is what the flash writes, or what it read. An update takes 10^5 transfers. One of them
+ * fails if the machine stands still for longer than hidapi waits, so a failed order is given again. An order that the
+ * bridge has carried out changes nothing when it comes again. */
+static int gateware_order(struct whisker_device *device, uint8_t command, uint32_t address, uint8_t *data)
+{
+    uint8_t report[WHISKER_REPORT_FLASH_BYTES];
+    int error = gateware_try(device, command, address, data, report);
+    for (int i = 1; i < TRIES && (error == WHISKER_ERROR_DEVICE_REFUSED || error == WHISKER_ERROR_DEVICE_CONTROL);
+         i++) {
+        error = gateware_await(device, report);
+        error = error ? error : gateware_try(device, command, address, data, report);
+    }
+    if (!error) {
+        memcpy(data, report + WHISKER_REPORT_FLASH_DATA, UNIT);
+    }
     return error;
 }
 

@@ -33,6 +33,9 @@ static struct {
     uint32_t cut;    /* orders that write until power goes in the midst of one */
     uint32_t writes; /* so many came */
     uint32_t orders;
+    uint32_t transfers; /* of orders and of the report */
+    uint32_t lose;      /* one transfer in so many fails, before or after the bridge has it; 0: none */
+    uint32_t lost;      /* so many in a row */
     uint8_t identity[3];
     uint32_t writable;
     bool cut_preamble; /* the order in whose midst power went changes the place of the preamble */
@@ -50,10 +53,16 @@ int device_silence(struct whisker_device *device)
     return WHISKER_OK;
 }
 
+static bool loses(void)
+{
+    chip.transfers++;
+    return chip.lose > 0 && (chip.transfers + chip.lose / 2) % chip.lose < chip.lost;
+}
+
 int device_flash(struct whisker_device *device, uint8_t *report)
 {
     (void)device;
-    if (chip.gone || chip.deaf) {
+    if (chip.gone || chip.deaf || loses()) {
         return chip.gone ? WHISKER_ERROR_DEVICE_GONE : WHISKER_ERROR_DEVICE_CONTROL;
     }
     memcpy(report, chip.report, sizeof chip.report);
@@ -81,6 +90,10 @@ int device_send_flash(struct whisker_device *device, const uint8_t *report)
     if (chip.gone) {
         return WHISKER_ERROR_DEVICE_GONE;
     }
+    const bool lost = loses();
+    if (lost && chip.transfers % 2) {
+        return WHISKER_ERROR_DEVICE_REFUSED;
+    }
     assert_true(chip.silenced && address % UNIT == 0 && address < SIZE);
     chip.orders++;
     memcpy(chip.report, report, sizeof chip.report);
@@ -99,7 +112,7 @@ int device_send_flash(struct whisker_device *device, const uint8_t *report)
                    !chip.gone);
         }
     }
-    return chip.gone ? WHISKER_ERROR_DEVICE_GONE : WHISKER_OK;
+    return chip.gone ? WHISKER_ERROR_DEVICE_GONE : lost ? WHISKER_ERROR_DEVICE_REFUSED : WHISKER_OK;
 }
 
 /* A bitstream: text, preamble, and bytes drawn for it alone. */
@@ -285,6 +298,25 @@ static void a_flash_that_stays_busy_or_is_worn_is_reported(void **state)
     assert_int_equal(started(), FALLBACK);
 }
 
+/* Single transfers fail: of an order, before and after the flash has it, and of the report. */
+static void an_order_that_failed_is_given_again(void **state)
+{
+    for (uint32_t lose = 5; lose < 12; lose += 2) {
+        set_up(state);
+        chip.lose = lose;
+        chip.lost = 1;
+        assert_int_equal(update(), WHISKER_OK);
+        assert_int_equal(started(), NEW);
+        assert_true(marked(new_image));
+        assert_memory_equal(chip.flash + WRITABLE, other, sizeof other);
+    }
+    set_up(state);
+    chip.lose = 1000;
+    chip.lost = 10; /* that is no longer one transfer */
+    const int error = update();
+    assert_true(error == WHISKER_ERROR_DEVICE_REFUSED || error == WHISKER_ERROR_DEVICE_CONTROL);
+}
+
 static void only_an_image_for_this_bridge_fits(void **state)
 {
     (void)state;
@@ -330,6 +362,7 @@ int main(void)
         cmocka_unit_test_setup(an_interrupted_update_goes_on_where_it_was, set_up),
         cmocka_unit_test_setup(what_cannot_take_an_image_is_left_untouched, set_up),
         cmocka_unit_test_setup(a_flash_that_stays_busy_or_is_worn_is_reported, set_up),
+        cmocka_unit_test_setup(an_order_that_failed_is_given_again, set_up),
         cmocka_unit_test_setup(only_an_image_for_this_bridge_fits, set_up),
         cmocka_unit_test_setup(a_damaged_image_is_none, set_up),
     };
