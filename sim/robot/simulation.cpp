@@ -172,8 +172,8 @@ int Simulation::run()
         child_ = std::make_unique<Child>(options_.command);
     }
     while (!ended()) {
-        const bool progress = advance();
-        deliver_completed();
+        const bool stepped = advance();
+        const bool progress = deliver_completed() || stepped; // to deliver takes requests, which are not to wait
         if (!progress) {
             wait(pace_.wait_ms(tick_, IDLE_WAIT_MS));
         } else if (++steps_ % STEPS_TO_LOOK == 0) {
@@ -423,15 +423,16 @@ void Simulation::take_requests()
     }
 }
 
-void Simulation::deliver_completed()
+bool Simulation::deliver_completed()
 {
     std::vector<Urb> urbs = scheduler_.take_completed();
     if (urbs.empty()) {
-        return;
+        return false;
     }
     defect_.spoil(urbs);
     port_->deliver(std::move(urbs));
     take_requests();
+    return true;
 }
 
 void Simulation::wait(int timeout_ms)

@@ -62,7 +62,7 @@ class Simulation
     void plug();
     void unplug();
     void take_requests();
-    void deliver_completed();
+    bool deliver_completed(); // true: there was something
     void wait(int timeout_ms);
     void read_signals();
 

@@ -12,7 +12,7 @@ namespace bridge_sim
 namespace
 {
 
-constexpr unsigned HOLD_MS = 10;
+constexpr unsigned HOLD_MS = 10, FIRST_HOLD_MS = 1;
 constexpr size_t SETUP_BYTES = 8;
 
 UMockdevIoctlData *resolve(UMockdevIoctlData *data, size_t offset, size_t size)
@@ -44,7 +44,7 @@ bool kind_of(const usbdevfs_urb &urb, UrbKind &kind)
 
 } // namespace
 
-UsbfsConnection::UsbfsConnection(UMockdevIoctlClient *client) : client_(client)
+UsbfsConnection::UsbfsConnection(UMockdevIoctlClient *client) : client_(client), hold_ms_(HOLD_MS)
 {
     g_object_add_toggle_ref(G_OBJECT(client_), on_last_reference, this);
 }
@@ -189,6 +189,7 @@ void UsbfsConnection::ended(const Urb &urb)
         return;
     }
     fill(at->second, urb);
+    hold_ms_ = urb.kind == UrbKind::CONTROL ? 0 : hold_ms_;
     done_.push_back(std::move(at->second.urb));
     transfers_.erase(at);
     if (reaping_) {
@@ -217,10 +218,21 @@ void UsbfsConnection::reap(bool wait)
     } else if (gone_) {
         reaping_ = false;
         answer(ENODEV);
+    } else if (!wait && hold_ms_ == 0) {
+        not_yet();
     } else if (!wait) {
-        hold_ = g_timeout_source_new(HOLD_MS);
+        hold_ = g_timeout_source_new(hold_ms_);
         g_source_set_callback(hold_, on_hold_over, this, nullptr);
         g_source_attach(hold_, g_main_context_get_thread_default());
+    }
+}
+
+void UsbfsConnection::not_yet()
+{
+    reaping_ = false;
+    hold_ms_ = hold_ms_ == 0 ? FIRST_HOLD_MS : std::min(2 * hold_ms_, HOLD_MS);
+    if (const IoctlDataRef pointer = living_argument()) {
+        answer(EAGAIN);
     }
 }
 
@@ -228,10 +240,7 @@ int UsbfsConnection::on_hold_over(void *self)
 {
     auto *connection = static_cast<UsbfsConnection *>(self);
     connection->stop_holding();
-    connection->reaping_ = false;
-    if (const IoctlDataRef pointer = connection->living_argument()) {
-        connection->answer(EAGAIN);
-    }
+    connection->not_yet();
     return G_SOURCE_REMOVE;
 }
 

@@ -62,8 +62,9 @@ class UsbfsConnection
     // A transfer has ended. Answers a waiting reap, or a waiting ioctl that stands for a transfer.
     void ended(const Urb &urb);
 
-    // USBDEVFS_REAPURB and its non-blocking form, which is held back for HOLD_MS: usbfs is a plain file here and always
-    // looks ready to poll(), so that libusb would spin.
+    // USBDEVFS_REAPURB and its non-blocking form, which is held back for up to HOLD_MS: usbfs is a plain file here and
+    // always looks ready to poll(), so that libusb would spin. libusb submits nothing while it is held back. After a
+    // control transfer, which often has a successor, it is answered at once, then held back for ever longer.
     void reap(bool wait);
 
     // The client's ioctl is answered when this transfer has ended.
@@ -81,6 +82,7 @@ class UsbfsConnection
     void hand_over();
     void fill(Transfer &transfer, const Urb &urb);
     void stop_holding();
+    void not_yet();
 
     UMockdevIoctlClient *client_;
     Transfer reading_; // between read_urb() and in_flight()
@@ -88,6 +90,7 @@ class UsbfsConnection
     std::deque<IoctlDataRef> done_;
     bool reaping_ = false;
     GSource *hold_ = nullptr;
+    unsigned hold_ms_; // of the next reap that finds nothing
     uint64_t waited_for_ = 0;
     bool answered_ = false; // its ioctl
     bool gone_ = false;     // the device
