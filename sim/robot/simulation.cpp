@@ -173,7 +173,7 @@ int Simulation::run()
     }
     while (!ended()) {
         const bool stepped = advance();
-        const bool progress = deliver_completed() || stepped; // to deliver takes requests, which are not to wait
+        const bool progress = deliver_completed() || stepped; // a delivery takes requests, which must not wait
         if (!progress) {
             wait(pace_.wait_ms(tick_, IDLE_WAIT_MS));
         } else if (++steps_ % STEPS_TO_LOOK == 0) {

@@ -72,7 +72,7 @@ struct writing {
     void *context;
 };
 
-/* Waits for the end of what the flash is at; `report` then holds what came. */
+/* Waits until the flash is idle; `report` then holds the latest order and what came. */
 static int gateware_await(struct whisker_device *device, uint8_t report[WHISKER_REPORT_FLASH_BYTES])
 {
     int error = WHISKER_OK;

@@ -62,9 +62,10 @@ class UsbfsConnection
     // A transfer has ended. Answers a waiting reap, or a waiting ioctl that stands for a transfer.
     void ended(const Urb &urb);
 
-    // USBDEVFS_REAPURB and its non-blocking form, which is held back for up to HOLD_MS: usbfs is a plain file here and
-    // always looks ready to poll(), so that libusb would spin. libusb submits nothing while it is held back. After a
-    // control transfer, which often has a successor, it is answered at once, then held back for ever longer.
+    // USBDEVFS_REAPURB and its non-blocking form. usbfs is a plain file here and always looks ready to poll(), so that
+    // libusb would spin. So the non-blocking form waits up to HOLD_MS for a result. While it waits, libusb submits
+    // nothing. After a control transfer the host often submits another one, so the first such call after it does not
+    // wait, and the next ones wait for 1 ms, 2 ms and so on, up to HOLD_MS.
     void reap(bool wait);
 
     // The client's ioctl is answered when this transfer has ended.
