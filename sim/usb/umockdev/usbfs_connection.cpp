@@ -189,7 +189,7 @@ void UsbfsConnection::ended(const Urb &urb)
         return;
     }
     fill(at->second, urb);
-    hold_ms_ = urb.kind == UrbKind::CONTROL ? 0 : hold_ms_;
+    hold_ms_ = 0;
     done_.push_back(std::move(at->second.urb));
     transfers_.erase(at);
     if (reaping_) {

@@ -63,9 +63,9 @@ class UsbfsConnection
     void ended(const Urb &urb);
 
     // USBDEVFS_REAPURB and its non-blocking form. usbfs is a plain file here and always looks ready to poll(), so that
-    // libusb would spin. So the non-blocking form waits up to HOLD_MS for a result. While it waits, libusb submits
-    // nothing. After a control transfer the host often submits another one, so the first such call after it does not
-    // wait, and the next ones wait for 1 ms, 2 ms and so on, up to HOLD_MS.
+    // libusb would spin. So the non-blocking form waits up to HOLD_MS for a result. While it waits, libusb neither
+    // submits nor reports what it has reaped. So the first such call after a result does not wait, and the next ones
+    // wait for 1 ms, 2 ms and so on, up to HOLD_MS.
     void reap(bool wait);
 
     // The client's ioctl is answered when this transfer has ended.
