@@ -17,6 +17,8 @@ static void test_a_measurement_corrects_what_is_correlated(void **state)
     double mean[NAV_JOINT_FACES], cov[NAV_JOINT_FACES * NAV_JOINT_FACES];
     struct nav_joint j = {.room = NAV_JOINT_FACES, .mean = mean, .cov = cov};
     struct nav_linear x = {.terms = 0}, y = {.terms = 0};
+    for (int n = 0; n < NAV_JOINT_FACES * NAV_JOINT_FACES; n++)
+        cov[n] = 7.0; /* nothing of what lay there remains */
     nav_joint_begin(&j, 0.0, 0.0);
     nav_joint_move(&j, (struct nav_pose){0.0, 0.0, 0.0}, (struct nav_noise){0.0, 0.01});
     nav_joint_move(&j, (struct nav_pose){2.0, 0.0, 0.0}, (struct nav_noise){0.0, 0.0});

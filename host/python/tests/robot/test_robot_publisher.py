@@ -76,3 +76,17 @@ def test_a_contact_is_reported_once_as_it_begins_and_once_as_it_ends():
     reported = [(c.whisker, c.touching, c.onset.ns, c.release.ns, c.header.stamp.ns) for c in link.topics["contact"]]
     ends = [(n + 1) * BLOCK_TICKS * TICK_NS for n in changes]
     assert reported == [("left", True, 90 * TICK_NS, 0, ends[0]), ("left", False, 90 * TICK_NS, 170 * TICK_NS, ends[1])]
+
+
+def test_an_angle_that_was_not_read_is_no_angle():
+    behaviour = SimpleNamespace(state=State.FORWARD, since=0, reason="", whisking=False)
+    names = {0: "left", 2: "right"}
+    pilot = SimpleNamespace(contacts={}, whisks=[], names=names, object_lanes=[], behaviour=behaviour)
+    link, kind = Heard(), [("alpha", "u2"), ("beta", "u2"), ("status", "u1")]
+    samples = np.array([(32768 + 16384, 32768, 0), (1, 2, 1)], kind)
+    publisher = Publisher(link, pilot)
+    publisher.block(BLOCK_TICKS - 1)
+    publisher.row(ROW, Report((0.0, 0.0, 0.0), COVARIANCE, NO_BUMPS), samples)
+    (joints,) = link.topics["joints"]
+    assert joints.name == ["left/alpha", "left/beta", "right/alpha", "right/beta"]
+    assert joints.position == pytest.approx([np.pi / 4, 0.0, np.nan, np.nan], nan_ok=True)
