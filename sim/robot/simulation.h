@@ -62,7 +62,7 @@ class Simulation
     void plug();
     void unplug();
     void take_requests();
-    bool deliver_completed(); // true: there was something
+    bool deliver_completed(); // true: something was delivered
     void wait(int timeout_ms);
     void read_signals();
 

@@ -18,7 +18,7 @@ static void test_a_measurement_corrects_what_is_correlated(void **state)
     struct nav_joint j = {.room = NAV_JOINT_FACES, .mean = mean, .cov = cov};
     struct nav_linear x = {.terms = 0}, y = {.terms = 0};
     for (int n = 0; n < NAV_JOINT_FACES * NAV_JOINT_FACES; n++)
-        cov[n] = 7.0; /* nothing of what lay there remains */
+        cov[n] = 7.0; /* memory that was used before */
     nav_joint_begin(&j, 0.0, 0.0);
     nav_joint_move(&j, (struct nav_pose){0.0, 0.0, 0.0}, (struct nav_noise){0.0, 0.01});
     nav_joint_move(&j, (struct nav_pose){2.0, 0.0, 0.0}, (struct nav_noise){0.0, 0.0});

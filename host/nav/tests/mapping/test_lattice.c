@@ -1,34 +1,38 @@
 /* The lattice of tiles, sought in the trail of one texture tip that wanders over a floor whose tiles are known here. */
 #include "near.h"
 
-#include <stdlib.h>
-
 #include "lattice.h"
 #include "rooms.h"
 
 enum { CLASSES = 3, STEPS = 3500, SEEDS = 4 };
 
-/* Of the tile at a column and a row; as good as drawn. */
-static int tile_class(long column, long row, unsigned seed)
+/* As good as drawn, for a place of a floor. */
+static uint32_t drawn_at(int column, int row, unsigned seed)
 {
-    unsigned hash = ((unsigned)column * 2654435761u) ^ ((unsigned)row * 2246822519u) ^ (seed * 3266489917u);
+    uint32_t hash = ((uint32_t)column * 2654435761u) ^ ((uint32_t)row * 2246822519u) ^ (seed * 3266489917u);
     hash = (hash ^ hash >> 15) * 2654435761u;
-    return (int)((hash ^ hash >> 13) % CLASSES);
+    hash = (hash ^ hash >> 13) * 3266489917u;
+    return hash ^ hash >> 16;
 }
 
-/* Of the patch whose middle is nearest; the middles lie anywhere, one in a square of 0.4 m. */
+/* From 0 to 1. */
+static double share_of(uint32_t drawn)
+{
+    return drawn / 4294967296.0;
+}
+
+/* Class of the patch whose middle is nearest; the middles lie anywhere, one in each square of 0.4 m. */
 static int patch_class(double x, double y, unsigned seed)
 {
     double nearest = INFINITY;
-    int class = 0;
-    int column = (int)floor(x / 0.4), row = (int)floor(y / 0.4);
+    int class = 0, column = (int)floor(x / 0.4), row = (int)floor(y / 0.4);
     for (int i = column - 2; i <= column + 2; i++) {
         for (int k = row - 2; k <= row + 2; k++) {
-            srand((unsigned)(i * 7919 + k * 104729) ^ seed);
-            double mx = (i + rand() / (double)RAND_MAX) * 0.4, my = (k + rand() / (double)RAND_MAX) * 0.4;
+            double mx = (i + share_of(drawn_at(i, k, seed + 100))) * 0.4;
+            double my = (k + share_of(drawn_at(i, k, seed + 200))) * 0.4;
             if (hypot(x - mx, y - my) < nearest) {
                 nearest = hypot(x - mx, y - my);
-                class = rand() % CLASSES;
+                class = (int)(drawn_at(i, k, seed) % CLASSES);
             }
         }
     }
@@ -55,38 +59,37 @@ static int ground_class(const struct ground *g, double x, double y)
 {
     if (g->pitch == 0.0)
         return patch_class(x, y, g->seed);
-    return tile_class((long)floor(along(g, x, y) / g->pitch), (long)floor(across(g, x, y) / g->pitch), g->seed);
+    int column = (int)floor(along(g, x, y) / g->pitch), row = (int)floor(across(g, x, y) / g->pitch);
+    return (int)(drawn_at(column, row, g->seed) % CLASSES);
 }
 
-/* 70 m within a square of 3 m, a window each 2 cm, one in ten of them wrong. */
+/* 70 m within a square of 3 m, a window each 2 cm, one in ten of them of a class that is drawn. */
 static bool find(const struct ground *g, struct nav_lattice *out)
 {
     struct nav_problem p = room();
     struct nav_trail trail;
     struct nav_lattice_search search;
-    struct nav_pose pose = {0.0, 0.0, 0.0}, still = {0.0, 0.0, 0.0};
-    double turns = 0.0;
-    uint32_t drawn = g->seed + 1;
+    struct nav_pose pose = {0.0, 0.0, 0.0};
+    double turn = 0.0;
     p.arena.classes = CLASSES;
     assert_int_equal(nav_trail_init(&trail, &p.arena, &p.robot), 0);
     assert_int_equal(nav_lattice_search_init(&search, CLASSES), 0);
     for (int n = 0; n < STEPS; n++) {
-        drawn = drawn * 1664525u + 1013904223u;
         bool outside = fabs(pose.x) > 1.5 || fabs(pose.y) > 1.5;
-        turns = outside ? remainder(atan2(-pose.y, -pose.x) - pose.theta, 2.0 * NAV_PI) / 4.0
-                        : 0.9 * turns + 0.06 * ((drawn >> 8) / (double)(1 << 23) - 1.0);
-        nav_trail_move(&trail, (struct nav_pose){0.02, 0.0, turns});
+        turn = outside ? remainder(atan2(-pose.y, -pose.x) - pose.theta, 2.0 * NAV_PI) / 4.0
+                       : 0.9 * turn + 0.12 * (share_of(drawn_at(n, 1, g->seed)) - 0.5);
+        nav_trail_move(&trail, (struct nav_pose){0.02, 0.0, turn});
         pose.x += 0.02 * cos(pose.theta);
         pose.y += 0.02 * sin(pose.theta);
-        pose.theta += turns;
+        pose.theta += turn;
         double x = pose.x + ROOM_TIP[0].x * cos(pose.theta), y = pose.y + ROOM_TIP[0].x * sin(pose.theta);
-        int class = drawn % 1000003 % 10 == 0 ? (int)(drawn >> 16) % CLASSES : ground_class(g, x, y);
+        bool wrong = drawn_at(n, 2, g->seed) % 10 == 0;
+        int class = wrong ? (int)(drawn_at(n, 3, g->seed) % CLASSES) : ground_class(g, x, y);
         float ratio[CLASSES] = {0.15f, 0.15f, 0.15f};
         ratio[class] = 2.7f;
         nav_trail_add(&trail, &pose, 0, 0.02, ratio);
         nav_trail_row_done(&trail);
     }
-    nav_trail_move(&trail, still);
     bool found = nav_lattice_find(&search, &trail, 0.0, out);
     nav_trail_free(&trail);
     nav_lattice_search_free(&search);

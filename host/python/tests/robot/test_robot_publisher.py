@@ -1,4 +1,4 @@
-"""What a pilot reports of its odometry: where it is by its own sums, how fast it moved, and how sure that is."""
+"""What a pilot publishes: odometry and its covariance, contacts, joint angles."""
 
 from types import SimpleNamespace
 
@@ -28,11 +28,18 @@ class Heard:
         return SimpleNamespace(send=self.topics.setdefault(topic, []).append)
 
 
+def pilot_with(**parts) -> SimpleNamespace:
+    """A pilot that drives forward, without whiskers but for these parts."""
+    behaviour = SimpleNamespace(state=State.FORWARD, since=0, reason="", whisking=False)
+    return SimpleNamespace(
+        **{"contacts": {}, "whisks": [], "names": {}, "object_lanes": [], "behaviour": behaviour} | parts
+    )
+
+
 @pytest.fixture
 def reported():
     """A call: the odometry messages after these motions, 0.1 s each, all of the same covariance."""
-    behaviour = SimpleNamespace(state=State.FORWARD, since=0, reason="", whisking=False)
-    pilot = SimpleNamespace(contacts={}, whisks=[], names={}, object_lanes=[], behaviour=behaviour)
+    pilot = pilot_with()
 
     def after(*motions, rows_before=0):
         link = Heard()
@@ -65,8 +72,7 @@ def test_the_pose_is_the_sum_of_the_motions_and_pretends_no_covariance(reported)
 
 def test_a_contact_is_reported_once_as_it_begins_and_once_as_it_ends():
     contact = SimpleNamespace(onset=-1, release=-1, touching=False)
-    behaviour = SimpleNamespace(state=State.FORWARD, since=0, reason="", whisking=False)
-    pilot = SimpleNamespace(contacts={2: contact}, whisks=[], names={2: "left"}, object_lanes=[2], behaviour=behaviour)
+    pilot = pilot_with(contacts={2: contact}, names={2: "left"}, object_lanes=[2])
     link = Heard()
     publisher = Publisher(link, pilot)
     changes = {2: {"onset": 90, "touching": True}, 4: {"release": 170, "touching": False}}
@@ -78,10 +84,8 @@ def test_a_contact_is_reported_once_as_it_begins_and_once_as_it_ends():
     assert reported == [("left", True, 90 * TICK_NS, 0, ends[0]), ("left", False, 90 * TICK_NS, 170 * TICK_NS, ends[1])]
 
 
-def test_an_angle_that_was_not_read_is_no_angle():
-    behaviour = SimpleNamespace(state=State.FORWARD, since=0, reason="", whisking=False)
-    names = {0: "left", 2: "right"}
-    pilot = SimpleNamespace(contacts={}, whisks=[], names=names, object_lanes=[], behaviour=behaviour)
+def test_an_angle_that_was_not_read_is_nan():
+    pilot = pilot_with(names={0: "left", 2: "right"})
     link, kind = Heard(), [("alpha", "u2"), ("beta", "u2"), ("status", "u1")]
     samples = np.array([(32768 + 16384, 32768, 0), (1, 2, 1)], kind)
     publisher = Publisher(link, pilot)
