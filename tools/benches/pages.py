@@ -10,7 +10,7 @@ from pathlib import Path
 from . import headlines, studies
 from .contact import page as contact
 from .mechanics import edges
-from .nav import active, map_peers, map_representations, maps, normals, size, tasks, unseen
+from .nav import map_peers, maps, unseen
 from .nav import page as nav
 from .node import image
 from .node import page as node
@@ -41,14 +41,8 @@ PAGES: dict[str, Callable[[], str]] = {
     "docs/results/host.md": of(studies.host, "host", "record", "view", "fuzz", "damage", "usb_soak"),
     "docs/results/mechanics.md": of(edges.page, "mechanics", "mechanics_edges"),
     "docs/results/nav.md": partial(parts, nav.document, "nav", NAV),
-    "docs/results/nav_active.md": of(active.page, "nav_active"),
-    "docs/results/nav_normals.md": of(normals.page, "nav_normals"),
-    "docs/results/nav_paper.md": of(studies.nav_paper, "nav_paper"),
     "docs/results/map.md": of(maps.page, "map"),
     "docs/results/map_peers.md": of(map_peers.page, "map_peers"),
-    "docs/results/map_representations.md": of(map_representations.page, "map_representations"),
-    "docs/results/nav_size.md": of(size.page, "nav_size"),
-    "docs/results/nav_tasks.md": of(tasks.page, "nav_tasks"),
     "docs/results/nav_unseen.md": of(unseen.page, "nav_unseen", "nav_designs", "nav_ablations", "nav_left_out"),
     "docs/results/node_faults.md": of(node.page, "node", "node_faults", "node_cuts"),
     "docs/results/node_image.md": of(image.page, "node_image"),

@@ -23,7 +23,7 @@ def shares(family, policy):
 
 
 def test_a_task_visits_more_than_chance():
-    """In 2 minutes; `tools/benches nav_tasks` measures 5."""
+    """In 2 minutes."""
     by_task, by_chance = (np.mean(shares("robot", policy)) for policy in (mapping, as_it_is))
     assert by_task > 0.6 and by_task > by_chance + 0.05
 

@@ -55,7 +55,6 @@ def test_directions_lie_as_the_faces_do(made):
 
 @pytest.mark.parametrize("name", ["grid", "particle", "multi", "adaptive", "foveal", "ekf", "ukf"])
 def test_filters_use_them(made, name):
-    """What a direction is worth is measured by tools/benches normals."""
     with_them, without = (
         localise.run(name, made.scene, rows) for rows in (made.observations, replace(made.observations, normal=None))
     )
