@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-rtl demo-map demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build setup setup-tests abi example-data docs manual gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-rtl demo-map demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build setup setup-tests example-data docs manual gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -69,16 +69,11 @@ build: setup ## compile libraries, daemon, firmware core, simulated bridge and t
 setup: ## install what the build lacks: Debian packages, locked Python packages
 	@tools/setup.sh
 
-setup-tests: ## and what the tests need besides: clang, spin, compiler and simulator for AVR, libabigail
+setup-tests: ## and what the tests need besides: clang, spin, compiler and simulator for AVR
 	@tools/setup.sh --tests
 
 example-data: build ## make the data set of `whisker examples` again: host/python/crunchbot/data
 	@$(PYTHON) tools/example_data.py
-
-abi: build ## write the binary interface of the libraries again, after a change on purpose: host/abi
-	@for library in libwhisker/libwhisker nav/libwhisker-nav create/libwhisker-create; do \
-		abidw --no-corpus-path --no-comp-dir-path --no-show-locs --no-elf-needed --type-id-style hash \
-			--out-file host/abi/$${library#*/}.abi $(BUILD)/host/$$library.so || exit 1; done
 
 docs: build ## pages and API of C and Python as a site, every warning an error: build/site/html; [EXTERNAL=1] tries addresses outside
 	@command -v doxygen >/dev/null || { if [ "$$(id -u)" -eq 0 ]; then SUDO=; else SUDO=sudo; fi; \

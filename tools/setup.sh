@@ -39,7 +39,6 @@ cmd:spin spin
 cmd:avr-gcc gcc-avr
 file:/usr/lib/avr/include/avr/io.h avr-libc
 cmd:simavr simavr
-cmd:abidiff abigail-tools
 LIST
 }
 

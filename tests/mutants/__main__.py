@@ -35,7 +35,6 @@ TIMEOUTS_S = (
     300.0,
     1800.0,
 )  # for one command of the nearest tests, and of the others; a mutant that hangs is killed by it
-LOOKS_AT_TEXT = "--ignore=tests/repository/test_mutations.py"  # fails with any change of a line that it names
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 
 
@@ -134,7 +133,6 @@ class Tree:
             "-p",
             "no:cacheprovider",
             "-rfE",
-            LOOKS_AT_TEXT,
         ]
         spread = ["--numprocesses", "2", "--dist", "loadfile"] if len(paths) > 1 else []
         for _ in range(2):

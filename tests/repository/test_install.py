@@ -139,14 +139,6 @@ def test_every_version_is_the_same():
     assert crunchbot.__version__ == VERSION
 
 
-@pytest.mark.parametrize("library", LIBRARIES)
-def test_binary_interface_is_the_committed_one(prefix, library):
-    """Where it changes on purpose: host/abi/README.md."""
-    command = [tool("abidiff"), "--no-show-locs", ROOT / f"host/abi/lib{library}.abi", prefix / f"lib/lib{library}.so"]
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=END_S)
-    assert done.returncode == 0, f"host/abi/README.md says what to do\n{done.stdout}{done.stderr}"
-
-
 def test_example_streams_from_the_device(examples, tmp_path):
     scene, _ = write_flat_scene(tmp_path, 1)
     command = simulation(tmp_path, scene, 600, 1, "unused")

@@ -19,7 +19,7 @@ INSTEAD = {
 WORD = re.compile(rf"\b(?:{'|'.join(INSTEAD)})\b", re.IGNORECASE)
 BUMP = re.compile(r"\bbumps?\b", re.IGNORECASE)
 # A bump is what the Create's bumper reports: in its interface, and in the pilot and the programs that read it.
-CREATE = re.compile(r"create|base|pilot|wheels|behaviour|bumper|protocol/|tests/mutations", re.IGNORECASE)
+CREATE = re.compile(r"create|base|pilot|wheels|behaviour|bumper|protocol/", re.IGNORECASE)
 OWN = ("tools/lint/words.py", "tests/repository/test_guards.py")  # files that name the words to refuse them
 
 
