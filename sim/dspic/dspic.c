@@ -51,7 +51,6 @@ void dspic_reset(struct dspic *chip, uint16_t cause)
 
 static void dspic_boot(struct dspic *chip)
 {
-    dspic_by_edges(chip);
     system_reset(chip, chip->cause);
     chip->in_start = true;
     chip->wiring.start(chip->wiring.context);
@@ -61,7 +60,6 @@ static void dspic_boot(struct dspic *chip)
 
 static void dspic_lose_power(struct dspic *chip)
 {
-    dspic_by_edges(chip);
     chip->powered = false;
     for (unsigned e = 0; e < EVENT_OUTSIDE; e++)
         chip->due_fs[e] = NEVER;

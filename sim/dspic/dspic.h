@@ -45,15 +45,6 @@ struct dspic_parameters {
 
 void dspic_parameters_default(struct dspic_parameters *parameters);
 
-/* A word that the chip's SPI master sends: edge n of its clock, counted from 1, comes at begun_fs + n * half_fs; the
- * odd ones rise. */
-struct dspic_word {
-    uint64_t begun_fs, half_fs;
-    uint16_t sent;
-    uint8_t bits;
-    uint8_t clock, data; /* numbers of the pins: the clock, and what is sampled; above 15: none */
-};
-
 /* What is connected to the chip, and the code it runs. Called from within the functions below. */
 struct dspic_wiring {
     void *context;
@@ -63,10 +54,6 @@ struct dspic_wiring {
     void (*interrupt)(void *context, unsigned irq); /* body of IRQ_* */
     void (*trap)(void *context, enum dspic_trap);
     void (*outside)(void *context); /* see dspic_outside_at */
-    /* Both or neither: a master's word may be exchanged whole, at its last edge, if word_begins allows it. Then
-     * word_ends returns what was sampled, and `pin` does not hear of its clock. */
-    bool (*word_begins)(void *context, const struct dspic_word *word);
-    uint16_t (*word_ends)(void *context, const struct dspic_word *word);
 };
 
 /* What the firmware did that the data sheet forbids. Tests demand zero. */
@@ -111,19 +98,6 @@ uint64_t dspic_cycle_fs(const struct dspic *chip);
 
 /* The outside drives pin RB0 to RB15, from `now_fs` on. Peripherals react at once, interrupts when time goes on. */
 void dspic_input(struct dspic *chip, unsigned rp, bool level, uint64_t now_fs);
-
-/* For those about to change what answers a word under way, or to look at it: its edges so far are played now, and the
- * others one by one. The chip does so itself before its pins or the module's state change, or PORTB is read. */
-void dspic_by_edges(struct dspic *chip);
-
-/* Pins that an outside master drives, `clock` and `data`, and the one it reads. */
-struct dspic_lines {
-    uint8_t clock, data, answer;
-};
-
-/* What 2 * 16 calls of dspic_input at this time do: the outside clocks `word` into the slave, and gets what it sent.
- * False: another slave listens, or it stands within a word; nothing was done. */
-bool dspic_input_word(struct dspic *chip, const struct dspic_lines *lines, uint16_t *word, uint64_t now_fs);
 
 /* wiring.outside is called once at this time, exactly, whatever the firmware is doing; it may call dspic_input for the
  * present time, dspic_outside_at and dspic_disturb_*. One such time is remembered. */

@@ -28,13 +28,11 @@ struct spi {
     uint16_t transmit, receive; /* the two halves of SPIxBUF */
     uint16_t word;              /* being sent, whole */
     uint16_t out, in;           /* shift registers */
-    uint64_t begun_fs;          /* master: when the word began */
     uint64_t half_fs;           /* master: half a bit */
     uint64_t enabled_fs;        /* when SPIEN was set */
     uint8_t bit;                /* bits done of this word */
     bool loaded;                /* `word` waits for its first clock */
     bool shifting;              /* master: a word is under way */
-    bool whole;                 /* and is exchanged whole, at its end */
     bool high;                  /* level of SCK */
     bool sdo;
 };
@@ -136,7 +134,6 @@ void dspic_irq_take(struct dspic *chip);                /* takes all that may be
 void spi_wrote(struct dspic *chip, unsigned n, unsigned address, uint16_t old);
 uint16_t spi_read_buffer(struct dspic *chip, unsigned n);
 void spi_event(struct dspic *chip, unsigned n);
-void spi_by_edges(struct dspic *chip, unsigned n);
 void spi_input(struct dspic *chip, unsigned rp, bool level);
 /* Output of pin function RP_*; with the module or its output off the pin stays the port's. */
 void spi_drives(const struct dspic *chip, unsigned function, bool *driven, bool *level);

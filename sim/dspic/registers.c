@@ -19,7 +19,6 @@ uint16_t registers_read(struct dspic *chip, unsigned address)
     case TMR3:
         return timer_count(chip, 2);
     case PORTB: {
-        dspic_by_edges(chip);
         uint16_t pins = chip->inputs;
         for (unsigned rp = 0; rp < 16u; rp++) {
             if (chip->drive[rp] != DSPIC_FLOAT)
@@ -69,18 +68,8 @@ static void dspic_registers_wrote(struct dspic *chip, unsigned address, uint16_t
     }
 }
 
-/* What changes the pins, or ends a word, finds the word's edges so far played. */
-static void dspic_registers_play_edges(struct dspic *chip, unsigned address)
-{
-    if (address == SPI1STAT || address == SPI2STAT)
-        spi_by_edges(chip, address == SPI2STAT);
-    else if (dspic_registers_within(address, RPINR0, RPOR0 + 14u) || dspic_registers_within(address, TRISB, ODCB))
-        dspic_by_edges(chip);
-}
-
 void registers_write(struct dspic *chip, unsigned address, uint16_t value)
 {
-    dspic_registers_play_edges(chip, address);
     const uint16_t old = *dspic_chip_sfr(chip, address);
     const unsigned target = address == PORTB ? LATB : address;
     *dspic_chip_sfr(chip, target) = value;

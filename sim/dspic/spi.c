@@ -52,29 +52,14 @@ static void dspic_spi_load(struct dspic *chip, unsigned n)
     s->loaded = true;
 }
 
-static struct dspic_word dspic_spi_word(const struct dspic *chip, unsigned n)
-{
-    const struct spi *s = &chip->spi[n];
-    const unsigned bits = dspic_spi_width(chip, n);
-    return (struct dspic_word){.begun_fs = s->begun_fs,
-                               .half_fs = s->half_fs,
-                               .sent = s->word & (uint16_t)(0xFFFFu >> (16u - bits)),
-                               .bits = (uint8_t)bits,
-                               .clock = chip->spi_pin[n][0],
-                               .data = (uint8_t)pin_input_field(chip, n == 0 ? RPINR20 : RPINR22, 0)};
-}
-
 static void dspic_spi_begin(struct dspic *chip, unsigned n)
 {
     struct spi *s = &chip->spi[n];
     dspic_spi_load(chip, n);
-    s->begun_fs = chip->now_fs;
     s->half_fs = dspic_spi_divider(dspic_spi_con1(chip, n)) * chip->cycle_fs / 2u;
     s->shifting = true;
     s->high = false;
-    const struct dspic_word word = dspic_spi_word(chip, n);
-    s->whole = chip->wiring.word_begins && chip->wiring.word_begins(chip->wiring.context, &word);
-    dspic_plan_event(chip, EVENT_SPI1 + n, s->begun_fs + (s->whole ? 2u * word.bits : 1u) * s->half_fs);
+    dspic_plan_event(chip, EVENT_SPI1 + n, chip->now_fs + s->half_fs);
 }
 
 static void dspic_spi_shift_out(struct dspic *chip, unsigned n)
@@ -111,7 +96,7 @@ static void dspic_spi_sample(struct dspic *chip, unsigned n)
 }
 
 /* Master: SCK rises and the bit goes out, SCK falls and the bit comes in (CKP 0, CKE 0, SMP 0: SPI mode 1). */
-static void dspic_spi_master_edge(struct dspic *chip, unsigned n)
+void spi_event(struct dspic *chip, unsigned n)
 {
     struct spi *s = &chip->spi[n];
     s->high = !s->high;
@@ -120,31 +105,6 @@ static void dspic_spi_master_edge(struct dspic *chip, unsigned n)
     pins_of_spi(chip, n);
     if (!s->high)
         dspic_spi_sample(chip, n);
-}
-
-/* What a word's edges leave in the shift registers. */
-static void dspic_spi_shift_word(struct dspic *chip, unsigned n, uint16_t in)
-{
-    struct spi *s = &chip->spi[n];
-    const unsigned bits = dspic_spi_width(chip, n);
-    s->in = in;
-    s->sdo = (unsigned)s->out >> (16u - bits) & 1u;
-    s->out = (uint16_t)((uint32_t)s->out << bits);
-    s->bit = (uint8_t)bits;
-    pins_of_spi(chip, n);
-}
-
-/* An edge of a master's word, or all of them. */
-void spi_event(struct dspic *chip, unsigned n)
-{
-    struct spi *s = &chip->spi[n];
-    if (s->whole) {
-        const struct dspic_word word = dspic_spi_word(chip, n);
-        dspic_spi_shift_word(chip, n, chip->wiring.word_ends(chip->wiring.context, &word));
-        s->whole = false;
-    } else {
-        dspic_spi_master_edge(chip, n);
-    }
     if (s->bit < dspic_spi_width(chip, n) || s->high) {
         dspic_plan_event(chip, EVENT_SPI1 + n, chip->now_fs + s->half_fs);
         return;
@@ -153,27 +113,6 @@ void spi_event(struct dspic *chip, unsigned n)
     dspic_spi_end_word(chip, n);
     if (*dspic_spi_reg(chip, n, STAT) & SPISTAT_SPITBF && !s->shifting)
         dspic_spi_begin(chip, n);
-}
-
-void spi_by_edges(struct dspic *chip, unsigned n)
-{
-    struct spi *s = &chip->spi[n];
-    const uint64_t now = chip->now_fs;
-    if (!s->whole)
-        return;
-    s->whole = false;
-    dspic_plan_event(chip, EVENT_SPI1 + n, s->begun_fs + s->half_fs);
-    while (chip->due_fs[EVENT_SPI1 + n] <= now) {
-        chip->now_fs = chip->due_fs[EVENT_SPI1 + n];
-        event_handle(chip, EVENT_SPI1 + n);
-    }
-    chip->now_fs = now;
-}
-
-void dspic_by_edges(struct dspic *chip)
-{
-    spi_by_edges(chip, 0);
-    spi_by_edges(chip, 1);
 }
 
 /* The last edge was the word's last one. */
@@ -226,40 +165,6 @@ void spi_input(struct dspic *chip, unsigned rp, bool level)
         if (pin_input_field(chip, n == 0 ? RPINR20 : RPINR22, 8u) == rp)
             dspic_spi_slave_edge(chip, n, level);
     }
-}
-
-static bool dspic_spi_listens(const struct dspic *chip, unsigned n, unsigned clock)
-{
-    return dspic_spi_enabled(chip, n) && !(dspic_spi_con1(chip, n) & SPICON1_MSTEN) &&
-           pin_input_field(chip, n == 0 ? RPINR20 : RPINR22, 8u) == clock;
-}
-
-/* SPI2 alone hears this clock, between two words of 16 bits, and its output is the pin that is read. */
-static bool dspic_spi_takes_words(const struct dspic *chip, const struct dspic_lines *lines)
-{
-    const struct spi *s = &chip->spi[1];
-    return dspic_spi_listens(chip, 1u, lines->clock) && !dspic_spi_listens(chip, 0, lines->clock) &&
-           dspic_spi_selected(chip, 1u) && dspic_spi_width(chip, 1u) == 16u && s->bit == 0 && !s->high &&
-           !(dspic_spi_con1(chip, 1u) & SPICON1_DISSDO) && chip->spi_pin[1][1] == lines->answer &&
-           pin_input_field(chip, RPINR22, 0) == lines->data && !pin_level(chip, lines->clock) &&
-           pin_input_field(chip, RPINR0, 8u) != lines->clock && pin_input_field(chip, RPINR1, 0) != lines->clock;
-}
-
-bool dspic_input_word(struct dspic *chip, const struct dspic_lines *lines, uint16_t *word, uint64_t now_fs)
-{
-    struct spi *s = &chip->spi[1];
-    const uint16_t sent = *word;
-    if (now_fs > chip->now_fs)
-        dspic_run_until(chip, now_fs);
-    if (!chip->powered || !dspic_spi_takes_words(chip, lines))
-        return false;
-    if (!s->loaded)
-        dspic_spi_load(chip, 1u);
-    *word = s->out;
-    dspic_wire(chip, lines->data, sent & 1u);
-    dspic_spi_shift_word(chip, 1u, sent);
-    dspic_spi_end_slave_word(chip, 1u);
-    return true;
 }
 
 uint16_t spi_read_buffer(struct dspic *chip, unsigned n)

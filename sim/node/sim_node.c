@@ -188,8 +188,7 @@ sim_node *sim_node_new_as(const struct sim_node_parameters *parameters)
     node->parameters = *parameters;
     node->chip = dspic_new(&parameters->chip,
                            &(struct dspic_wiring){node, sim_node_on_pin, sim_node_on_start, sim_node_on_loop,
-                                                  sim_node_on_interrupt, sim_node_on_trap, sim_node_on_outside,
-                                                  sim_node_sensor_byte_begins, sim_node_sensor_byte_ends});
+                                                  sim_node_on_interrupt, sim_node_on_trap, sim_node_on_outside});
     node->board.chip = node->chip;
     if (node->chip) {
         sim_node_program_default(node);
@@ -299,40 +298,6 @@ bool sim_node_sck(sim_node *node, bool level, bool mosi)
     return dspic_output(node->chip, PIN_LINK_MISO) != DSPIC_LOW;
 }
 
-static void sim_node_note_word(struct sim_node_tick *came, uint16_t sent)
-{
-    if (came->step != SIM_NODE_SELECTED || came->bits > LINK_BITS - WORD_BITS) {
-        came->step = SIM_NODE_ODD;
-        return;
-    }
-    came->order = came->order << WORD_BITS | sent;
-    came->bits = (uint8_t)(came->bits + WORD_BITS);
-}
-
-static uint16_t sim_node_word_by_edges(sim_node *node, uint16_t sent)
-{
-    uint16_t answer = 0;
-    for (unsigned i = WORD_BITS; i-- > 0;) {
-        const bool bit = ((unsigned)sent >> i & 1u) != 0u;
-        answer = (uint16_t)(answer << 1 | sim_node_sck(node, true, bit));
-        (void)sim_node_sck(node, false, bit);
-    }
-    return answer;
-}
-
-static uint16_t sim_node_word(sim_node *node, uint16_t sent)
-{
-    static const struct dspic_lines LINES = {PIN_LINK_CLOCK, PIN_LINK_MOSI, PIN_LINK_MISO};
-    uint16_t word = sent;
-    const bool whole =
-        !node->deaf && !node->by_edges && dspic_input_word(node->chip, &LINES, &word, node->tick_fs + SELECT_FS);
-    if (!whole)
-        return sim_node_word_by_edges(node, sent);
-    sim_node_note_word(&node->came, sent);
-    node->bits += WORD_BITS;
-    return word;
-}
-
 uint64_t sim_node_transfer(sim_node *node, uint64_t order)
 {
     uint64_t bits = 0;
@@ -341,8 +306,11 @@ uint64_t sim_node_transfer(sim_node *node, uint64_t order)
         node->came = (struct sim_node_tick){node->came.field, order, LINK_BITS, false, SIM_NODE_SELECTED};
     } else {
         sim_node_select(node, true);
-        for (unsigned i = LINK_BITS; i > 0; i -= WORD_BITS)
-            bits = bits << WORD_BITS | sim_node_word(node, (uint16_t)(order >> (i - WORD_BITS)));
+        for (unsigned i = LINK_BITS; i-- > 0;) {
+            const bool mosi = order >> i & 1u;
+            bits = bits << 1 | sim_node_sck(node, true, mosi);
+            (void)sim_node_sck(node, false, mosi);
+        }
     }
     sim_node_select(node, false);
     return bits;

@@ -36,9 +36,8 @@ void sim_node_plan(sim_node *node, uint64_t at_fs);
 void sim_node_field(sim_node *node, struct sim_field field);
 void sim_node_sensor_fault(sim_node *node, enum sim_sensor_fault fault, unsigned argument);
 
-/* From now on nothing is exchanged whole, neither bytes nor words, and the fault-free twin of the sensor is always
- * there: the way that the quicker one is held against. */
-void sim_node_by_edges(sim_node *node);
+/* From now on the fault-free twin of the sensor is always there: the way that the quicker one is held against. */
+void sim_node_keep_twin(sim_node *node);
 
 /* What may befall the chip and the supplies, at the present time. */
 enum sim_node_disturbance {

@@ -1,6 +1,5 @@
 /* The sensor on the chip's wires, and its twin. While no fault has been near the sensor the twin would do the same: it
- * is left out, and the sensor stands for both. A byte is exchanged whole then, at its last edge; what interferes in its
- * midst has dspic_by_edges() play the edges so far. */
+ * is left out, and the sensor stands for both. */
 #include <string.h>
 
 #include "sim_node_state.h"
@@ -18,10 +17,13 @@ static unsigned sim_node_sensor_position(const struct mlx90333 *sensor)
 
 static void sim_node_sensor_begin_frame(struct sim_node *node, uint64_t now_ns)
 {
-    node->begun = node->known;
-    node->begun.number = node->frame.number + 1u;
-    node->begun.begun_fs = now_ns * DSPIC_FS_PER_NS;
-    node->begun.slip = (uint8_t)(sim_node_sensor_position(&node->sensor) % 64u);
+    const struct sampler *sampler = &node->board.node.sampler;
+    node->begun = (struct sim_node_frame){.number = node->frame.number + 1u,
+                                          .begun_fs = now_ns * DSPIC_FS_PER_NS,
+                                          .slip = (uint8_t)(sim_node_sensor_position(&node->sensor) % 64u),
+                                          .followed = sampler->followed,
+                                          .alpha_before = sampler->alpha,
+                                          .beta_before = sampler->beta};
 }
 
 void sim_node_sensor_end_frame(struct sim_node *node)
@@ -31,10 +33,21 @@ void sim_node_sensor_end_frame(struct sim_node *node)
     node->frame.sent = node->clean;
 }
 
+static void sim_node_sensor_join(struct sim_node *node)
+{
+    if (!node->apart || node->twin_stays || !mlx90333_equal(&node->sensor, &node->twin))
+        return;
+    memcpy(node->sensor.violations, node->twin.violations, sizeof node->sensor.violations);
+    node->apart = false;
+}
+
 /* Returns what the chip sees. */
 static bool sim_node_sensor_edge(struct sim_node *node, bool level, bool sent, uint64_t now_ns)
 {
-    if (level && sim_node_sensor_position(sim_node_sensor_clean(node)) == 0)
+    const unsigned position = sim_node_sensor_position(sim_node_sensor_clean(node));
+    if (level && position % 8u == 0)
+        sim_node_sensor_join(node);
+    if (level && position == 0)
         sim_node_sensor_begin_frame(node, now_ns);
     const bool seen = mlx90333_clock(&node->sensor, now_ns, level, sent);
     const bool clean = node->apart ? mlx90333_clock(&node->twin, now_ns, level, sent) : seen;
@@ -69,46 +82,10 @@ void sim_node_sensor_part(struct sim_node *node)
     const uint64_t random = node->twin.random;
     if (node->apart)
         return;
-    dspic_by_edges(node->chip);
     node->twin = node->sensor;
     node->twin.random = random;
     node->twin.sense.parameters = &node->twin.parameters;
     node->apart = true;
-}
-
-static void sim_node_sensor_join(struct sim_node *node)
-{
-    if (!node->apart || node->by_edges || !mlx90333_equal(&node->sensor, &node->twin))
-        return;
-    memcpy(node->sensor.violations, node->twin.violations, sizeof node->sensor.violations);
-    node->apart = false;
-}
-
-bool sim_node_sensor_byte_begins(void *context, const struct dspic_word *word)
-{
-    struct sim_node *node = context;
-    const struct sampler *sampler = &node->board.node.sampler;
-    node->known = (struct sim_node_frame){
-        .followed = sampler->followed, .alpha_before = sampler->alpha, .beta_before = sampler->beta};
-    sim_node_sensor_join(node);
-    const bool only_ones = (word->sent + 1u) >> word->bits && dspic_output(node->chip, PIN_SENSOR_SEND) != DSPIC_LOW;
-    return !node->apart && only_ones && word->clock == PIN_SENSOR_CLOCK && word->data == PIN_SENSOR_DATA;
-}
-
-uint16_t sim_node_sensor_byte_ends(void *context, const struct dspic_word *word)
-{
-    struct sim_node *node = context;
-    uint64_t at_fs = word->begun_fs;
-    uint16_t in = 0;
-    for (unsigned edge = 0; edge < 2u * word->bits; edge++) {
-        const bool rises = edge % 2u == 0;
-        at_fs += word->half_fs;
-        const bool seen = sim_node_sensor_edge(node, rises, true, at_fs / DSPIC_FS_PER_NS);
-        if (!rises)
-            in = (uint16_t)(in << 1 | seen);
-    }
-    dspic_wire(node->chip, PIN_SENSOR_DATA, in & 1u);
-    return in;
 }
 
 void sim_node_sensor_power_on(struct sim_node *node)
@@ -116,7 +93,7 @@ void sim_node_sensor_power_on(struct sim_node *node)
     mlx90333_power_on(&node->sensor, 0, &node->parameters.sensor);
     node->twin.random = node->sensor.random;
     node->apart = false;
-    if (node->by_edges)
+    if (node->twin_stays)
         sim_node_sensor_part(node);
 }
 
@@ -124,7 +101,6 @@ void sim_node_sensor_power_on(struct sim_node *node)
 void sim_node_sensor_supply(struct sim_node *node, bool on)
 {
     const uint64_t now_ns = dspic_now_fs(node->chip) / DSPIC_FS_PER_NS;
-    dspic_by_edges(node->chip);
     sim_node_sensor_select(node, true, now_ns);
     mlx90333_supply(&node->sensor, now_ns, on);
     if (node->apart)
@@ -172,12 +148,11 @@ void sim_node_sensor_forget_releases(struct sim_node *node)
 
 uint32_t sim_node_sensor_violations(const struct sim_node *node)
 {
-    dspic_by_edges(node->chip);
     return mlx90333_violations(node->apart ? &node->twin : &node->sensor);
 }
 
-void sim_node_by_edges(sim_node *node)
+void sim_node_keep_twin(sim_node *node)
 {
-    node->by_edges = true;
+    node->twin_stays = true;
     sim_node_sensor_part(node);
 }

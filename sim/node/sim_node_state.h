@@ -7,7 +7,7 @@
 #include "sim_node_lab.h"
 
 #define SIM_NODE_TICK_FS (SIM_TICK_NS * DSPIC_FS_PER_NS)
-enum { WORD_BITS = 16, LINK_BITS = LINK_WORDS * WORD_BITS };
+enum { LINK_BITS = LINK_WORDS * 16 };
 
 /* What has come from the bridge in the present tick. */
 enum sim_node_step {
@@ -61,7 +61,7 @@ struct sim_node {
     struct mlx90333 sensor;
     struct mlx90333 twin; /* on the same wires, and spared every fault: it judges the master, and shows what was sent */
     bool apart;           /* else the sensor stands for its twin, which has nothing of its own but `random` */
-    bool by_edges;        /* nothing is exchanged whole, and the twin is always apart */
+    bool twin_stays;      /* the twin is always apart */
     struct sim_node_parameters parameters;
     uint64_t tick_fs; /* start of the present tick */
     bool powered;
@@ -70,9 +70,8 @@ struct sim_node {
     bool second;                 /* in its second window */
     enum sim_sensor_fault fault; /* of the next reading */
     unsigned argument;
-    uint32_t releases;           /* breaches of t4 by the firmware; a reset's own are nobody's fault */
-    uint64_t line, clean;        /* newest 64 bits of the sensor's line as its master sampled it, and of the twin's */
-    struct sim_node_frame known; /* what the firmware knew when the byte under way began */
+    uint32_t releases;    /* breaches of t4 by the firmware; a reset's own are nobody's fault */
+    uint64_t line, clean; /* newest 64 bits of the sensor's line as its master sampled it, and of the twin's */
     struct sim_node_frame begun, frame; /* the frame under way, the one that has last ended */
     void (*act)(void *context);
     void *act_context;
@@ -83,11 +82,9 @@ struct sim_node {
     struct sim_node_quick quick;
 };
 
-/* sim_node_sensor.c: edges of /SS and of the clock, and whole bytes in their place; see struct dspic_wiring. */
+/* sim_node_sensor.c: edges of /SS and of the clock. */
 void sim_node_sensor_select(struct sim_node *node, bool level, uint64_t now_ns);
 void sim_node_sensor_clock(struct sim_node *node, bool level, uint64_t now_ns);
-bool sim_node_sensor_byte_begins(void *context, const struct dspic_word *word);
-uint16_t sim_node_sensor_byte_ends(void *context, const struct dspic_word *word);
 void sim_node_sensor_end_frame(struct sim_node *node); /* the firmware has its last byte */
 
 /* The first supply of all; both sensors with their supply or without; the sensor alone. */

@@ -57,23 +57,6 @@ static void on_outside(void *context)
     b->outside(b);
 }
 
-static bool on_word_begins(void *context, const struct dspic_word *word)
-{
-    const struct bench *b = context;
-    return b->whole && word->clock == SCK_PIN && word->data == SDI_PIN;
-}
-
-/* The line stands still meanwhile: all bits are as it is. */
-static uint16_t on_word_ends(void *context, const struct dspic_word *word)
-{
-    struct bench *b = context;
-    b->words++;
-    b->sent = b->sent << word->bits | word->sent;
-    if (!b->line)
-        return 0u;
-    return (uint16_t)(0xFFFFu >> (16u - word->bits));
-}
-
 struct dspic_parameters standard(void)
 {
     struct dspic_parameters parameters;
@@ -86,9 +69,8 @@ void make(const struct dspic_parameters *parameters)
     const struct dspic_parameters usual = standard();
     dspic_free(bench.chip);
     memset(&bench, 0, sizeof bench);
-    bench.chip = dspic_new(parameters ? parameters : &usual,
-                           &(struct dspic_wiring){&bench, on_pin, on_start, on_loop, on_interrupt, on_trap, on_outside,
-                                                  on_word_begins, on_word_ends});
+    bench.chip = dspic_new(parameters ? parameters : &usual, &(struct dspic_wiring){&bench, on_pin, on_start, on_loop,
+                                                                                    on_interrupt, on_trap, on_outside});
     assert_non_null(bench.chip);
 }
 

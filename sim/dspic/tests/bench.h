@@ -37,8 +37,6 @@ struct bench {
     void (*starting)(struct bench *);
     void (*trapping)(struct bench *);
     void (*outside)(struct bench *); /* see dspic_outside_at */
-    bool whole, line;                /* a master's words are exchanged whole; what they sample */
-    unsigned words;                  /* that were */
 };
 extern struct bench bench;
 
