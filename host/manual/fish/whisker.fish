@@ -258,8 +258,7 @@ complete -c whisker -n '__fish_seen_subcommand_from localise' -l list-settings -
 complete -c whisker -n '__fish_seen_subcommand_from map' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from map' -l help -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from map' -l out -d 'folder to write: a scene for localise, and map.yaml' -x
-complete -c whisker -n '__fish_seen_subcommand_from map' -l particles -d 'hypotheses held at a time (default: 12; 100 for grid)' -x
-complete -c whisker -n '__fish_seen_subcommand_from map' -l representation -d 'what the map is made of: straight faces and tiles; cells, a path a particle; faces in a factor graph of GTSAM, an extra; or faces or cells, whichever the rows are evidence for (default: faces)' -x -a 'faces grid graph auto'
+complete -c whisker -n '__fish_seen_subcommand_from map' -l particles -d 'hypotheses held at a time (default: 12)' -x
 complete -c whisker -n '__fish_seen_subcommand_from map' -l seed -d 'of every draw (default: 0)' -x
 complete -c whisker -n '__fish_seen_subcommand_from map' -l no-lattice -d 'do not look for a lattice of tiles'
 complete -c whisker -n '__fish_seen_subcommand_from map' -l json -d 'print the summary as one line of JSON'

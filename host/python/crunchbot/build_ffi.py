@@ -53,8 +53,6 @@ HEADERS = {
             "mapping/mapper.h",
             "planning/coverage.h",
             "planning/planner.h",
-            "mapping/grid/grid_mapper.h",
-            "mapping/grid/grid_path.h",
         )
     ],
     "whisker": [

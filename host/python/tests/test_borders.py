@@ -19,8 +19,7 @@ from rings import ring_name
 import crunchbot
 from crunchbot.bridge.ring import FRAME, Writer
 from crunchbot.native import as_doubles, doubles, ffi, lib, octets
-from crunchbot.nav.filters import COMPONENT, ESTIMATE, Filter, Sensor, pack, prior_fault
-from crunchbot.nav.map_choice import evidence_of
+from crunchbot.nav.filters import COMPONENT, Filter, Sensor, pack, prior_fault
 from crunchbot.nav.mapper import Mapper
 from crunchbot.nav.weigher import Weigher
 from crunchbot.planning.actions import Vehicle
@@ -112,12 +111,6 @@ CASES = {
     ),
     "nav.mapper.Mapper.replay": of_rows(
         lambda rows: Mapper(SCENE.robot, SCENE.arena.textures).replay(rows, 0, len(rows))
-    ),
-    "nav.map_choice.evidence_of": of_one(
-        lambda table: evidence_of(SCENE.robot, SCENE.arena.textures, OBSERVATIONS, table),
-        "table",
-        np.zeros(ROWS, ESTIMATE),
-        0,
     ),
     "nav.filters._sensors": Case(
         lambda **table: Filter("odometry", SCENE, sensors=[Sensor(cell_m=0.1, levels=2, **table)]),

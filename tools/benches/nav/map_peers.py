@@ -26,7 +26,6 @@ import matplotlib
 import numpy as np
 
 from crunchbot.nav import mapping
-from crunchbot.nav.mapper import MappingError
 from crunchbot.nav.observations import Observations
 from crunchbot.occupancy import from_map
 from crunchbot.scene import Robot
@@ -40,8 +39,7 @@ from ..markdown import table
 from . import charts, peer_runs
 
 FAMILIES = ("anchor", "robot", "raw", "noisy")
-OURS = {"faces": "faces and tiles", "grid": "grid in particles", "graph": "factor graph", mapping.AUTO: "faces or grid"}
-LOOKS = {"faces": "o", "grid": "s", "graph": "^", mapping.AUTO: "*", "odometry": "_"}
+OURS, OUR_TITLE, OUR_LOOK = "faces", "faces and tiles", "o"
 PEER_LOOKS = ("D", "v", "X", "P")
 LIMITS_US, LIMITS_MM = (30.0, 3e4), (5.0, 3e3)  # of the chart, one scale for all families
 PREFIX = "MAP_PEER_"
@@ -179,7 +177,7 @@ def one(name: str, program: str, world: tuple, seed: int) -> dict[str, float | s
         except RuntimeError as error:
             return {"error": str(error)}
     else:
-        run = mapping.run(*rows, seed, representation=name)
+        run = mapping.run(*rows, seed)
         poses, us = run.table["pose"], run.step_us
     return {
         "error_median_m": map_scoring.trajectory(poses, rows[2].truth)["error_median_m"],
@@ -187,17 +185,6 @@ def one(name: str, program: str, world: tuple, seed: int) -> dict[str, float | s
         "step_us_mean": float(us.mean()),
         "touched": float(np.isfinite(rows[2].radial_m).any(axis=1).mean()),
     }
-
-
-def ours() -> list[str]:
-    """Representations that can be had."""
-    robot, textures, _ = scene(FAMILIES[0], FIRST_SEED)
-    try:
-        mapping.REPRESENTATIONS["graph"](robot, textures)
-    except MappingError as error:
-        store.leave_out("factor graph", str(error))
-        return [name for name in OURS if name != "graph"]
-    return list(OURS)
 
 
 def measure(build: Path, seeds: int, workers: int, logs: list[Path]) -> dict:
@@ -208,8 +195,7 @@ def measure(build: Path, seeds: int, workers: int, logs: list[Path]) -> dict:
         worlds |= {f"{path.stem}, {cut} m": [(str(path), cut, n) for n in range(count)] for cut in CUTS_M}
     jobs, parts = {}, {}
     for world, runs in worlds.items():
-        drawn = world in FAMILIES
-        for name in ("odometry", *(ours() if drawn else ("grid",)), *peers):
+        for name in ("odometry", OURS, *peers):
             parts[name, world] = [f"{name}-{world}-{n}".replace(" ", "") for n in range(len(runs))]
             jobs |= {
                 job: {"name": name, "program": peers.get(name, ""), "world": run, "seed": n}
@@ -231,15 +217,14 @@ def measure(build: Path, seeds: int, workers: int, logs: list[Path]) -> dict:
 def chart(data: dict) -> matplotlib.figure.Figure:
     """Error against time for a row, a panel for each family."""
     figure, axes = charts.panels(len(FAMILIES))
-    looks = LOOKS | dict(zip(data["peers"], PEER_LOOKS, strict=False))
+    looks = {OURS: OUR_LOOK} | dict(zip(data["peers"], PEER_LOOKS, strict=False))
     for ax, family in zip(axes, FAMILIES, strict=True):
         points = {p["mapper"]: p for p in data["points"] if p["world"] == family}
         wheels = 1000 * points.pop("odometry")["error_median_m"]
         ax.axhline(wheels, color="0.5", linestyle=":", linewidth=0.8, label="odometry")
         for name, p in points.items():
-            filled = {} if name in OURS else {"markerfacecolor": "white"}
-            place = (p["step_us_mean"], 1000 * p["error_median_m"])
-            ax.plot(*place, looks[name], color="0.0" if name in OURS else "0.35", label=OURS.get(name, name), **filled)
+            colours = {"color": "0.0"} if name == OURS else {"color": "0.35", "markerfacecolor": "white"}
+            ax.plot(p["step_us_mean"], 1000 * p["error_median_m"], looks[name], label=_title(name), **colours)
         ax.set(xscale="log", yscale="log", xlim=LIMITS_US, ylim=LIMITS_MM, title=family)
         ax.set(xlabel="CPU time of a row, us", ylabel="median error, mm")
         ax.grid(True, linewidth=0.3)
@@ -247,14 +232,16 @@ def chart(data: dict) -> matplotlib.figure.Figure:
     return figure
 
 
+def _title(mapper: str) -> str:
+    return OUR_TITLE if mapper == OURS else mapper
+
+
 def _lines(points: list[dict], touched: bool) -> list[list[str]]:
     lines = []
     for p in points:
         cells = [f"{1000 * p[key]:.0f}" for key in ("error_median_m", "error_worst_m", "odometry_error_median_m")]
         cells += [f"{100 * p['touched']:.0f}"] if touched else []
-        lines.append(
-            [p["world"], OURS.get(p["mapper"], p["mapper"]), str(p["runs"]), *cells, f"{p['step_us_mean']:.0f}"]
-        )
+        lines.append([p["world"], _title(p["mapper"]), str(p["runs"]), *cells, f"{p['step_us_mean']:.0f}"])
     return lines
 
 
@@ -276,7 +263,7 @@ def page(data: dict) -> str:
         "their defaults of 0.4 to 1 m are meant for lasers and would leave out nearly every contact. GMapping runs with "
         "its proposal by scan matching; where its program was measured, the likelihood was sampled 10 mm and 0.005 rad "
         "about the match.\n\n" + table(head, _lines(drawn, False)) + "\n"
-        "![error against cost, representations and peers](../charts/map_peers.svg)\n\n"
+        "![error against cost, our maps and peers](../charts/map_peers.svg)\n\n"
         "A scan is of a few beams as short as whiskers; between contacts a pose is the odometry's.\n"
     )
     if not logs:

@@ -5,7 +5,6 @@ import json
 
 from ..arguments import whole_number
 from ..nav import mapping
-from ..nav.grid_mapper import GridMapper
 from ..nav.mapper import PARTICLES_MOST, SEED_MOST, default_particles
 
 EXAMPLE = "whisker map examples/scene --out touched --json"
@@ -20,14 +19,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--particles",
         type=whole_number(1, PARTICLES_MOST),
         metavar="N",
-        help=f"hypotheses held at a time (default: {default_particles()}; {default_particles(GridMapper)} for grid)",
-    )
-    parser.add_argument(
-        "--representation",
-        choices=(*mapping.REPRESENTATIONS, mapping.AUTO),
-        default="faces",
-        help="what the map is made of: straight faces and tiles; cells, a path a particle; faces in a factor graph of "
-        "GTSAM, an extra; or faces or cells, whichever the rows are evidence for (default: %(default)s)",
+        help=f"hypotheses held at a time (default: {default_particles()})",
     )
     parser.add_argument(
         "--seed", type=whole_number(0, SEED_MOST), default=0, help="of every draw (default: %(default)s)"
@@ -39,8 +31,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     robot, textures, rows = mapping.read(arguments.scene)
-    lattice = not arguments.no_lattice
-    options = (arguments.seed, arguments.particles, lattice, arguments.json, arguments.representation)
+    options = (arguments.seed, arguments.particles, not arguments.no_lattice, arguments.json)
     mapped = mapping.run(robot, textures, rows, *options)
     reported = mapping.summary(mapped, mapping.write_map(arguments.out, mapped))
     print(json.dumps(reported) if arguments.json else "\n".join(f"{key}: {value}" for key, value in reported.items()))

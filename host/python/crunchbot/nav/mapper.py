@@ -103,8 +103,6 @@ class TouchMap:
 class Mapper:
     """Takes rows of observations and knows, after each, the pose and the map."""
 
-    PREFIX = "nav_mapper"  # of its functions in the library
-
     def __init__(
         self,
         robot: Robot,
@@ -116,7 +114,7 @@ class Mapper:
     ):
         """`lattice`: whether to look for one; `normals`: rows may hold directions of the surfaces that whiskers touch.
         MappingError when an option is out of range, or there is no memory."""
-        particles = default_particles(type(self)) if particles is None else particles
+        particles = default_particles() if particles is None else particles
         if not 1 <= particles <= PARTICLES_MOST:
             raise MappingError(f"--particles {particles}: outside 1 to {PARTICLES_MOST}; choose a number inside")
         if not 0 <= seed <= SEED_MOST:
@@ -125,17 +123,11 @@ class Mapper:
         self._texture = (len(robot.of_role("texture")), len(textures))
         self._rays = len(robot.of_role("object"))
         self._problem.seed, self._problem.robot.normals = seed, normals
-        options = ffi.new(f"struct {self.PREFIX}_options *", self._options(particles, lattice))
-        made = self._function("new")(self._problem, options)
+        options = ffi.new("struct nav_mapper_options *", {"particles": particles, "lattice": lattice})
+        made = lib.nav_mapper_new(self._problem, options)
         if made == ffi.NULL:
             raise MappingError(f"--particles {particles}: they do not fit in memory; choose fewer")
-        self._mapper = ffi.gc(made, self._function("free"))
-
-    def _function(self, name: str) -> Callable:
-        return getattr(lib, f"{self.PREFIX}_{name}")
-
-    def _options(self, particles: int, lattice: bool) -> dict[str, Any]:
-        return {"particles": particles, "lattice": lattice}
+        self._mapper = ffi.gc(made, lib.nav_mapper_free)
 
     def replay(self, rows: Observations, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Rows `first` to `first + count`: (count,) of ESTIMATE and (count,) microseconds of CPU time. ValueError when there
@@ -145,7 +137,7 @@ class Mapper:
         table, step_us = np.zeros(count, ESTIMATE), np.zeros(count)
         packed, keep = pack(rows, self._texture, self._rays, 0)
         out = pointer(ESTIMATES, ESTIMATE, table, "table", (count,))
-        self._function("replay")(self._mapper, packed, first, count, out, doubles(step_us, "step_us", (count,)))
+        lib.nav_mapper_replay(self._mapper, packed, first, count, out, doubles(step_us, "step_us", (count,)))
         del keep  # until here
         return table, step_us
 
@@ -176,7 +168,7 @@ class Mapper:
 
     def faces(self) -> np.ndarray:
         """(n,) of FACE, stretches that were felt."""
-        return self._listed(self._function("faces"), FACES, FACE, "faces")
+        return self._listed(lib.nav_mapper_faces, FACES, FACE, "faces")
 
     def lattice(self) -> Lattice | None:
         """None where the evidence is for none."""
@@ -184,17 +176,15 @@ class Mapper:
         place = (found.x, found.y, found.turn, found.pitch)
         return Lattice(*place, found.sigma_m, found.sigma_turn, found.sigma_pitch) if found.pitch > 0.0 else None
 
-    def _listed(
-        self, get: Callable[..., int], kind: Any, dtype: np.dtype, name: str, room: int | None = None
-    ) -> np.ndarray:
-        room = get(self._mapper, ffi.NULL, 0) if room is None else room
+    def _listed(self, get: Callable[..., int], kind: Any, dtype: np.dtype, name: str) -> np.ndarray:
+        room = get(self._mapper, ffi.NULL, 0)
         out = np.zeros(room, dtype)
         return out[: get(self._mapper, pointer(kind, dtype, out, name, (room,)), room)]
 
     def _grid(self) -> Grid:
-        grid = self._function("grid")(self._mapper)
+        grid = lib.nav_mapper_grid(self._mapper)
         occupied = np.zeros((grid.rows, grid.columns), np.float32)
-        self._function("occupancy")(self._mapper, floats(occupied, "occupied", occupied.shape))
+        lib.nav_mapper_occupancy(self._mapper, floats(occupied, "occupied", occupied.shape))
         return Grid(grid.x, grid.y, grid.cell, occupied)
 
     def _tiles(self) -> Iterator[tuple[tuple[int, int], tuple[int, float]]]:
@@ -207,16 +197,16 @@ class Mapper:
 
     @property
     def bad_cells(self) -> int:
-        return self._function("bad_cells")(self._mapper)
+        return lib.nav_mapper_bad_cells(self._mapper)
 
     @property
     def bad_rows(self) -> int:
-        return self._function("bad_rows")(self._mapper)
+        return lib.nav_mapper_bad_rows(self._mapper)
 
 
-def default_particles(kind: type[Mapper] = Mapper) -> int:
-    """How many hypotheses a mapper of this kind holds where nobody says."""
-    return int(getattr(lib, f"{kind.PREFIX}_default")().particles)
+def default_particles() -> int:
+    """How many hypotheses a mapper holds where nobody says."""
+    return int(lib.nav_mapper_default().particles)
 
 
 def nowhere(textures: tuple[str, ...]) -> Arena:

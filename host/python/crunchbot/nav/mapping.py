@@ -1,7 +1,6 @@
 """A map from the rows of a scene folder, without the arena that the folder may hold; and the folder that is written."""
 
 import math
-import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,9 +12,6 @@ from ..progress import bar
 from ..scene import OBSERVATIONS, Arena, Prior, Robot, Scene, load_robot, write
 from ..tables import TableError, read_rows, unwritable
 from .filters import ESTIMATE
-from .grid_mapper import GridMapper
-from .map_choice import evidence_of
-from .map_graph import GraphMapper
 from .map_scene import CELL_M, MapScene, map_scene
 from .mapper import LOOP_KINDS, PATCH_M, Mapper, Part, TouchMap
 from .observations import Observations, read_observations
@@ -24,13 +20,6 @@ CHUNK = 100  # rows between two steps of the progress bar
 FACES, TILES, CORNERS, CLOSURES, PARTS = "faces.csv", "tiles.csv", "corners.csv", "closures.csv", "parts.csv"
 ESTIMATES, IMAGE, MAP, CELLS = "est.csv", "map.png", "map.yaml", "occupancy.npy"
 START_SIGMA = (0.02, 0.02, 0.03)  # of the first pose in prior.toml: m, m, rad
-REPRESENTATIONS: dict[str, type[Mapper] | type[GraphMapper]] = {
-    "faces": Mapper,
-    "grid": GridMapper,
-    "graph": GraphMapper,
-}
-AUTO = "auto"  # faces or grid, whichever the evidence is for
-CARRIED_NATS = math.log(1e4)  # against a kidnap, one in so many rows, as host/nav/mapping/maps/kidnap.c has it
 GREYS = {FREE: 254, SOLID: 0}  # of ROS; any other cell is 205
 GREY_UNKNOWN = 205
 
@@ -39,8 +28,7 @@ GREY_UNKNOWN = 205
 class Mapped:
     """A run over all rows: the estimates (n,) of ESTIMATE, each from the rows until then, and what is left at its end.
     `frame` (n,): the part of the run in whose frame an estimate is. Those of a part that was joined with another are in
-    the other's frame, moved there afterwards; without kidnaps all are in that of the first pose, 0. `representation`: of
-    REPRESENTATIONS; `evidence`: nats for it over the other, where it was chosen by evidence."""
+    the other's frame, moved there afterwards; without kidnaps all are in that of the first pose, 0."""
 
     robot: Robot
     textures: tuple[str, ...]
@@ -52,8 +40,6 @@ class Mapped:
     bad_rows: int
     parts: tuple[Part, ...] = ()
     frame: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
-    representation: str = "faces"
-    evidence: float | None = None
 
     def poses(self) -> np.ndarray:
         """(n, 3) in the frame of the map; nan where a row's is not known in it: before an unjoined kidnap, and from a
@@ -103,41 +89,14 @@ def run(
     particles: int | None = None,
     lattice: bool = True,
     quiet: bool = True,
-    representation: str = "faces",
 ) -> Mapped:
-    """Map all rows, by one of REPRESENTATIONS or AUTO, where `particles` are those of the faces. MappingError when an option
-    is out of range."""
-    if representation == AUTO:
-        return _chosen(robot, textures, rows, seed, particles, lattice, quiet)
-    kind = REPRESENTATIONS[representation]
-    mapper = kind(robot, textures, seed, particles, lattice, rows.normal is not None)
+    """Map all rows. MappingError when an option is out of range."""
+    mapper = Mapper(robot, textures, seed, particles, lattice, rows.normal is not None)
     parts = [(np.zeros(0, ESTIMATE), np.zeros(0))]
     for first in bar(range(0, len(rows), CHUNK), disable=quiet, unit_scale=CHUNK, unit="rows", desc="map"):
         parts.append(mapper.replay(rows, first, min(CHUNK, len(rows) - first)))
     table, step_us = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return replace(left_by(mapper, robot, textures, rows, table, step_us), representation=representation)
-
-
-def _chosen(
-    robot: Robot,
-    textures: tuple[str, ...],
-    rows: Observations,
-    seed: int,
-    particles: int | None,
-    lattice: bool,
-    quiet: bool,
-) -> Mapped:
-    """Faces or grid, by the evidence of their paths. Faces alone notice that the robot was carried off: each such time
-    costs them its prior, and a map that was not joined is one of its own. Each pose is from the rows until then; which of the
-    two is taken, from all. Times are those of both and of comparing them."""
-    faces = run(robot, textures, rows, seed, particles, lattice, quiet)
-    grid = run(robot, textures, rows, seed, None, lattice, quiet, "grid")
-    begun = time.thread_time()
-    by_faces, by_grid = (evidence_of(robot, textures, rows, m.table, m.frame).sum() for m in (faces, grid))
-    evidence = float(by_faces - by_grid) - CARRIED_NATS * (len(faces.parts) - 1)
-    spent = 1e6 * (time.thread_time() - begun) / max(len(rows), 1)
-    taken = faces if evidence >= 0.0 else grid
-    return replace(taken, step_us=faces.step_us + grid.step_us + spent, evidence=abs(evidence))
+    return left_by(mapper, robot, textures, rows, table, step_us)
 
 
 def left_by(
@@ -252,8 +211,6 @@ def summary(mapped: Mapped, made: MapScene) -> dict:
     lattice = touched.lattice
     return {
         "steps": len(mapped.table),
-        "representation": mapped.representation,
-        "evidence_nats": None if mapped.evidence is None else round(mapped.evidence, 1),
         "size_m": [round(v, 3) for v in made.arena.size_m],
         "faces": len({int(n) for n in touched.faces["face"]}),
         "tile_m": round(lattice.pitch, 4) if lattice else None,

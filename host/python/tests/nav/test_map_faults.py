@@ -6,20 +6,18 @@ import resource
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from crunchbot import cli
 from crunchbot.nav import mapping
-from crunchbot_lab.scenes import map_scoring, write_scene
+from crunchbot_lab.scenes import write_scene
 from crunchbot_lab.scenes.making import make
 
 ROWS, HALF_HOUR = 600, 18000
 MOST_BYTES = 256e6
-REPRESENTATIONS = ("faces", "grid")
 
 
-def run(made, rows, representation):
-    return mapping.run(made.scene.robot, made.scene.arena.textures, rows, representation=representation)
+def run(made, rows):
+    return mapping.run(made.scene.robot, made.scene.arena.textures, rows)
 
 
 def broken(rows, impossible: bool):
@@ -37,12 +35,11 @@ def broken(rows, impossible: bool):
     return replace(rows, radial_m=radial, texture=texture), cells
 
 
-@pytest.mark.parametrize("representation", REPRESENTATIONS)
-def test_readings_out_of_range_are_counted_and_count_as_not_read(representation):
+def test_readings_out_of_range_are_counted_and_count_as_not_read():
     made = make("anchor", 31, ROWS)
     bad, cells = broken(made.observations, True)
     missing, _ = broken(made.observations, False)
-    read, unread, whole = (run(made, rows, representation) for rows in (bad, missing, made.observations))
+    read, unread, whole = (run(made, rows) for rows in (bad, missing, made.observations))
     assert cells > 100
     assert (read.bad_cells, unread.bad_cells, whole.bad_cells) == (cells, 0, 0)
     assert np.array_equal(read.table["pose"], unread.table["pose"])
@@ -50,25 +47,13 @@ def test_readings_out_of_range_are_counted_and_count_as_not_read(representation)
     assert not np.array_equal(read.table["pose"], whole.table["pose"])
 
 
-@pytest.mark.parametrize("representation", (*REPRESENTATIONS, mapping.AUTO))
-def test_a_scene_with_broken_cells_is_mapped_and_they_are_reported(representation, tmp_path, capsys):
+def test_a_scene_with_broken_cells_is_mapped_and_they_are_reported(tmp_path, capsys):
     made = make("anchor", 32, ROWS)
     bad, cells = broken(made.observations, True)
     write_scene(tmp_path / "scene", made.scene, bad)
     words = ["map", str(tmp_path / "scene"), "--out", str(tmp_path / "map"), "--json"]
-    assert cli.main([*words, "--representation", representation]) == 0
+    assert cli.main(words) == 0
     assert json.loads(capsys.readouterr().out)["bad_cells"] == cells
-
-
-@pytest.mark.parametrize("fault", ["nan-second", "dropped", "reordered", "dead"])
-def test_a_grid_stays_finite_and_about_as_good_as_odometry(fault):
-    made = make(f"anchor+{fault}", 33, 2 * ROWS)
-    rows = made.observations
-    mapped = run(made, rows, "grid")
-    assert np.isfinite(mapped.table["pose"]).all() and np.isfinite(mapped.table["covariance"]).all()
-    mine = map_scoring.trajectory(mapped.table["pose"], rows.truth)["error_median_m"]
-    wheels = map_scoring.trajectory(map_scoring.odometry_path(rows.odometry), rows.truth)["error_median_m"]
-    assert mine < max(1.5 * wheels, 0.1)
 
 
 def test_rows_that_never_came_make_it_less_sure():
@@ -76,12 +61,11 @@ def test_rows_that_never_came_make_it_less_sure():
     rows, kept = made.observations, np.r_[0:300, 360:ROWS]
     names = ("t_s", "odometry", "texture", "radial_m", "truth")
     gap = replace(rows, t_text=[rows.t_text[k] for k in kept], **{n: getattr(rows, n)[kept] for n in names})
-    for representation in REPRESENTATIONS:
-        spread = np.trace(run(made, gap, representation).table["covariance"][:, :2, :2], axis1=1, axis2=2)
-        assert spread[300] > 4.0 * spread[299]
+    spread = np.trace(run(made, gap).table["covariance"][:, :2, :2], axis1=1, axis2=2)
+    assert spread[300] > 4.0 * spread[299]
 
 
-def half_an_hour(representation, report) -> None:
+def half_an_hour(report) -> None:
     """Peak memory in bytes above that of a few rows, what the mapper says of it, and the work of its rows."""
     made = make("anchor", 35, HALF_HOUR)
     few = replace(
@@ -90,17 +74,16 @@ def half_an_hour(representation, report) -> None:
     few = replace(few, radial_m=few.radial_m[:2], truth=few.truth[:2])
     mapping.run(made.scene.robot, made.scene.arena.textures, few, particles=1)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    mapped = run(made, made.observations, representation)
+    mapped = run(made, made.observations)
     peak = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
     finite = bool(np.isfinite(mapped.table["pose"]).all())
     report.send((peak, int(mapped.table["bytes"].max()), mapped.table["evaluations"], finite))
 
 
-@pytest.mark.parametrize("representation", REPRESENTATIONS)
-def test_half_an_hour_takes_bounded_memory_and_no_more_work_a_row(representation):
+def test_half_an_hour_takes_bounded_memory_and_no_more_work_a_row():
     context = multiprocessing.get_context("spawn")  # the peak of this process is that of all tests before
     here, there = context.Pipe()
-    process = context.Process(target=half_an_hour, args=(representation, there))
+    process = context.Process(target=half_an_hour, args=(there,))
     process.start()
     there.close()
     peak, said, evaluations, finite = here.recv()
