@@ -1,5 +1,5 @@
 // Levels mixed in one run against RTL alone: the same fields, faults, orders and stops; every byte that the host
-// receives is the same.
+// receives is the same. `test_bridge_mixed SEEDS` for more.
 #include <cstdlib>
 
 #include "bytes_link.h"
@@ -16,6 +16,8 @@ constexpr size_t POPULATED = 6, TRANSFERS = 4, TRANSFER_BYTES = 4096;
 constexpr uint64_t RTL_TICKS = 300, TICKS = 6000;
 constexpr uint8_t SET_TYPE = 0x21, SET_REPORT = 9, GET_TYPE = 0xA1, GET_REPORT = 1;
 constexpr uint16_t FEATURE = 0x0300;
+
+uint64_t seeds = 2;
 
 // A host and a bridge: what it received, as text.
 class Side
@@ -187,7 +189,7 @@ class Pair
 
 void test_levels_mixed_give_the_same_bytes(void **)
 {
-    for (uint64_t seed = 1; seed <= 2; seed++) {
+    for (uint64_t seed = 1; seed <= seeds; seed++) {
         Pair pair(seed);
         pair.run();
         assert_int_equal(pair.rtl_ticks(0), TICKS);
@@ -198,8 +200,11 @@ void test_levels_mixed_give_the_same_bytes(void **)
 
 } // namespace
 
-int main()
+int main(int argc, char **argv)
 {
+    if (argc == 2) {
+        seeds = std::strtoull(argv[1], nullptr, 10);
+    }
     const CMUnitTest tests[] = {
         cmocka_unit_test(test_levels_mixed_give_the_same_bytes),
     };
