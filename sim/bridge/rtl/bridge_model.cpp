@@ -27,13 +27,12 @@ void evaluate(Vclocked_bridge___024root &root, uint64_t edge)
 } // namespace
 
 BridgeModel::BridgeModel(NodeBus &bus, NorFlash &flash)
-    : bus_(bus), flash_(flash), top_(std::make_unique<Vclocked_bridge>()), control_(*top_->rootp)
+    : bus_(bus), flash_(flash), top_(std::make_unique<Vclocked_bridge>())
 {
     top_->tick_external = 1;
     top_->tick_strobe = 0;
     top_->miso = UINT32_MAX >> (32 - LANES);
     top_->eval();
-    control_.settle();
     reset();
 }
 
@@ -70,11 +69,6 @@ void BridgeModel::run_nodes()
     }
     ended_ = busy_ && !link_busy();
     busy_ = link_busy();
-}
-
-uint64_t BridgeModel::control_edges() const
-{
-    return control_.edges();
 }
 
 bool BridgeModel::sync() const
@@ -172,7 +166,6 @@ void BridgeModel::cycle()
     top.utmi_tx_ready = in.tx_ready;
     top.utmi_line_state = in.line_state;
     evaluate(*top.rootp, RISING);
-    control_.edge();
     if (!top.flash_cs_n || top.flash_sck) {
         evaluate(*top.rootp, FALLING);
     }

@@ -5,7 +5,6 @@
 
 #include "bytes_settings.h"
 #include "flash/nor_flash.h"
-#include "gated_control.h"
 #include "node_bus.h"
 #include "sampling_state.h"
 #include "utmi.h"
@@ -43,9 +42,6 @@ class BridgeModel : public UtmiDevice
     bool every_frame() const;        // each frame ends its packet
     uint32_t tick_period() const;    // cycles
 
-    // Of `cycles`, those in which the control endpoint was evaluated.
-    uint64_t control_edges() const;
-
     // At level bytes a run of plain sampling may go on from here, between two ticks with no frame in the bridge; it
     // comes back as far as it has come, at such a time.
     LinkSettings settings() const;
@@ -58,7 +54,6 @@ class BridgeModel : public UtmiDevice
     NodeBus &bus_;
     FlashPins flash_;
     std::unique_ptr<Vclocked_bridge> top_;
-    GatedControl control_;
     bool free_ = false;  // ticks by itself
     bool busy_ = false;  // the link was, a cycle ago
     bool ended_ = false; // its transfer has

@@ -1,6 +1,6 @@
 """Where the simulated bridge's processor time goes, by part, and what bounds it: samples of the running program, each
-put to the part whose source line it is in. The control endpoint, of LUNA's half, is a model of its own; the rest of both
-halves is one function of Verilator's, where the line says by the register that it assigns which half it is.
+put to the part whose source line it is in. Both halves of the gateware are one function of Verilator's, where the line
+says by the register that it assigns which half it is.
 """
 
 import re
@@ -20,7 +20,6 @@ from .. import store
 HERE = Path(__file__).resolve().parent
 RATE_HZ = 4000
 MODEL = "Vclocked_bridge"
-CONTROL_MODEL = "Vcontrol_endpoint"
 LUNA = "clocked_bridge__DOT__bridge__DOT__usb__DOT__usb"
 ASSIGNED = re.compile(r"(clocked_bridge__DOT__\w+)\s*(?:\[.*\])?\s*(?:=(?!=)|$)")
 STATEMENT_LINES = 80  # that Verilator breaks one into, at most
@@ -73,8 +72,6 @@ def part(line: str) -> str:
     path, _, number = line.split(" ")[0].rpartition(":")
     if Path(path).name.startswith(MODEL):
         return gateware_half(path, int(number)) if number.isdigit() else LANES_HALF
-    if Path(path).name.startswith(CONTROL_MODEL) or Path(path).stem == "gated_control":
-        return LUNA_HALF
     name = str(Path(path).resolve())
     return next((of for folder, of in FOLDERS.items() if folder in name), REST)
 
