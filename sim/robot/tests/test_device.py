@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import whisker_protocol as protocol
 
 SIMULATION = os.environ.get("WHISKER_BRIDGE_SIM", "")
 CLIENT = os.environ.get("WHISKER_STREAM_CLIENT", "")
+USB_PROBE = os.environ.get("WHISKER_USB_PROBE", "")
 TICKS_PER_S = 2000
 BLOCK = 40
 TIMEOUT_S = 120
@@ -69,6 +71,15 @@ def test_level_changes_nothing(tmp_path):
     gateware = stream(tmp_path / "gateware", 2, 7, 4096, PATIENT_MS)
     model = stream(tmp_path / "model", 2, 7, 4096, PATIENT_MS, "--level", "bytes")
     assert gateware == model
+
+
+@pytest.mark.parametrize("level", ["rtl", "bytes"])
+def test_a_bus_reset_by_libusb_reaches_the_device(tmp_path, level):
+    """In the midst of a run, with frames under way: none of them comes after it, and the next run begins at tick 0."""
+    said = tmp_path / "said"
+    client = ["sh", "-c", f"{USB_PROBE} reset >{said} 2>&1"]
+    subprocess.run(command(tmp_path, 60, 1, client, "--level", level), capture_output=True, timeout=TIMEOUT_S)
+    assert re.fullmatch(r"\d+ frames\n", said.read_text())
 
 
 def test_exit_code_is_the_commands(tmp_path):
