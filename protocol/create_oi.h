@@ -167,7 +167,6 @@ enum { CREATE_OI_CHARGER_INTERNAL = 1, CREATE_OI_CHARGER_DOCK = 2 };
 /* Sensors are renewed, and the stream's frames sent, once in this time. A frame must fit into it. */
 #define CREATE_OI_PERIOD_MS 15
 #define CREATE_OI_BITS_PER_BYTE 10 /* on the line: start, 8 data, stop */
-#define CREATE_OI_SCRIPT_MAX 100   /* bytes */
 
 /* What opcode BAUD takes: X(code, baud). The new rate is in force CREATE_OI_BAUD_WAIT_MS later. */
 #define CREATE_OI_BAUDS(X)                                                                                             \

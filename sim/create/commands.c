@@ -55,32 +55,6 @@ static void commands_obey_drive(sim_create *create, uint8_t opcode, const uint8_
         create_drive_pwm(create, first, second);
 }
 
-static void commands_obey_script(sim_create *create, uint8_t opcode, const uint8_t *argument)
-{
-    switch (opcode) {
-    case CREATE_OI_OP_SCRIPT:
-        create_script_store(create, argument + 1, argument[0]);
-        break;
-    case CREATE_OI_OP_PLAY_SCRIPT:
-        create_script_play(create);
-        break;
-    case CREATE_OI_OP_SHOW_SCRIPT:
-        create_script_show(create);
-        break;
-    case CREATE_OI_OP_WAIT_TIME:
-        create_script_wait(create, WAIT_TIME, argument[0] * (TICKS_PER_S / 10));
-        break;
-    case CREATE_OI_OP_WAIT_DISTANCE:
-        create_script_wait(create, WAIT_DISTANCE, create_int16(argument));
-        break;
-    case CREATE_OI_OP_WAIT_ANGLE:
-        create_script_wait(create, WAIT_ANGLE, create_int16(argument));
-        break;
-    default:
-        create_script_wait(create, WAIT_EVENT, (int8_t)argument[0]);
-    }
-}
-
 static void commands_obey_sensors(sim_create *create, uint8_t opcode, const uint8_t *argument)
 {
     switch (opcode) {
@@ -98,17 +72,12 @@ static void commands_obey_sensors(sim_create *create, uint8_t opcode, const uint
     }
 }
 
-/* Lights, outputs, clocks: taken, and nothing comes of them. */
-static void commands_obey_other(sim_create *create, uint8_t opcode, const uint8_t *argument)
+static bool commands_is_script(uint8_t opcode)
 {
-    if (opcode == CREATE_OI_OP_BAUD)
-        create_line_change_baud(create, argument[0]);
-    else if (opcode == CREATE_OI_OP_SONG)
-        create_song_store(create, argument);
-    else if (opcode == CREATE_OI_OP_PLAY)
-        create_song_play(create, argument[0]);
+    return opcode >= CREATE_OI_OP_SCRIPT && opcode <= CREATE_OI_OP_WAIT_EVENT;
 }
 
+/* Of lights, outputs, clocks, songs, scripts and waits nothing comes. */
 void create_obey(sim_create *create, const uint8_t *command, size_t count)
 {
     uint8_t opcode = command[0];
@@ -119,10 +88,8 @@ void create_obey(sim_create *create, const uint8_t *command, size_t count)
         commands_obey_drive(create, opcode, argument);
     else if (opcode == CREATE_OI_OP_SENSORS || (opcode >= CREATE_OI_OP_STREAM && opcode <= CREATE_OI_OP_STREAM_STATE))
         commands_obey_sensors(create, opcode, argument);
-    else if (opcode >= CREATE_OI_OP_SCRIPT && opcode <= CREATE_OI_OP_WAIT_EVENT)
-        commands_obey_script(create, opcode, argument);
-    else if (count == 1 || opcode == CREATE_OI_OP_DEMO)
+    else if (opcode == CREATE_OI_OP_BAUD)
+        create_line_change_baud(create, argument[0]);
+    else if ((count == 1 && !commands_is_script(opcode)) || opcode == CREATE_OI_OP_DEMO)
         commands_obey_mode(create, opcode);
-    else
-        commands_obey_other(create, opcode, argument);
 }

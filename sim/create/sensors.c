@@ -57,8 +57,6 @@ static void sensors_renew_battery(sim_create *create)
 static void sensors_renew_orders(sim_create *create)
 {
     create->sensor[CREATE_OI_MODE] = (int32_t)create->mode + create->options.mode_plus_one;
-    create->sensor[CREATE_OI_SONG_NUMBER] = create->songs.number;
-    create->sensor[CREATE_OI_SONG_PLAYING] = create->ticks < create->songs.ends;
     create->sensor[CREATE_OI_STREAM_PACKETS] = (int32_t)create->stream.count;
     create->sensor[CREATE_OI_REQUESTED_VELOCITY] = create->wheels.velocity;
     create->sensor[CREATE_OI_REQUESTED_RADIUS] = (int32_t)(create->wheels.radius * create->options.distance_factor);

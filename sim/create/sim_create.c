@@ -43,8 +43,6 @@ void create_power_up(sim_create *create)
 {
     create->reader.count = 0;
     create->stream = (struct create_stream){0};
-    create->script = (struct create_script){0};
-    create->songs = (struct create_songs){0};
     create->line.count = create->line.frame = 0;
     create->line.baud = create->model->baud;
     create->line.change_at = 0;
@@ -57,7 +55,7 @@ void create_power_up(sim_create *create)
 void sim_create_receive(sim_create *create, const uint8_t *bytes, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        if (create_line_arrives(create) && !create_script_busy(create))
+        if (create_line_arrives(create))
             create_read_byte(create, bytes[i]);
 }
 
@@ -80,7 +78,6 @@ void sim_create_tick(sim_create *create, const struct sim_create_motion *motion)
     create->angle_deg = motion->angle_rad / SIM_DEGREE;
     create_battery_tick(create);
     create_stay_safe(create);
-    create_script_tick(create);
     if (create->ticks % PERIOD_TICKS == 0) {
         create_renew(create);
         create_send_frame(create);

@@ -11,8 +11,7 @@ enum {
     PERIOD_TICKS = CREATE_OI_PERIOD_MS * TICKS_PER_S / 1000,
     COUNT_MAX = 255,                 /* of a command whose first argument counts the others */
     COMMAND_MAX = 3 + 2 * COUNT_MAX, /* opcode, song number, notes, and two bytes each */
-    QUEUE_MAX = 1024,
-    SONGS = 16
+    QUEUE_MAX = 1024
 };
 
 /* What differs between the models. */
@@ -55,25 +54,6 @@ struct create_stream {
     size_t count;
 };
 
-enum create_wait { WAIT_NOTHING, WAIT_TIME, WAIT_DISTANCE, WAIT_ANGLE, WAIT_EVENT };
-
-struct create_script {
-    uint8_t byte[COUNT_MAX];
-    size_t count, position;
-    bool running;
-    bool restarted; /* in this tick, by itself */
-    enum create_wait wait;
-    int target;     /* ticks, mm, degrees or the event's number */
-    uint64_t begun; /* tick */
-    double from_mm, from_deg;
-};
-
-struct create_songs {
-    unsigned units[SONGS]; /* length of each in 1/64 s */
-    uint8_t number;
-    uint64_t ends; /* tick */
-};
-
 struct sim_create {
     struct sim_create_options options;
     const struct create_model *model;
@@ -86,8 +66,6 @@ struct sim_create {
     struct create_wheels wheels;
     struct create_line line;
     struct create_stream stream;
-    struct create_script script;
-    struct create_songs songs;
     int32_t sensor[CREATE_OI_PACKET_MAX + 1]; /* by packet, as last renewed; 19 and 20 are made when they are read */
     double renewed_mm, renewed_deg;           /* at that time */
     double read_mm, read_deg;                 /* up to where packets 19 and 20 have reported */
@@ -99,7 +77,7 @@ const struct create_model *create_model_of(int version);
 /* The power is switched on, or the robot reset. What was counted stays. */
 void create_power_up(sim_create *create);
 
-/* One byte from the host or a script. */
+/* One byte from the host. */
 void create_read_byte(sim_create *create, uint8_t byte);
 
 /* Does a whole command: its opcode and its arguments. */
@@ -131,17 +109,6 @@ void create_line_change_baud(sim_create *create, uint8_t code);
 void create_line_tick(sim_create *create);
 /* Does a byte from the host arrive? */
 bool create_line_arrives(sim_create *create);
-
-/* Is a script or a wait under way, so that nothing from the host is heard? */
-bool create_script_busy(const sim_create *create);
-void create_script_store(sim_create *create, const uint8_t *bytes, size_t count);
-void create_script_play(sim_create *create);
-void create_script_show(sim_create *create);
-void create_script_wait(sim_create *create, enum create_wait wait, int target);
-void create_script_tick(sim_create *create);
-
-void create_song_store(sim_create *create, const uint8_t *song);
-void create_song_play(sim_create *create, uint8_t number);
 
 void create_battery_start(sim_create *create);
 void create_battery_tick(sim_create *create);

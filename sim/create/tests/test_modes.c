@@ -125,13 +125,43 @@ static void test_an_empty_battery_switches_off(void **state)
     assert_mode(CREATE_OI_MODE_PASSIVE);
 }
 
+/* Each is followed by another order; their last arguments are opcodes themselves. */
+static void test_songs_scripts_and_waits_are_read_whole_and_do_nothing(void **state)
+{
+    (void)state;
+    ready(CREATE_OI_V2, CREATE_OI_OP_SAFE);
+    SEND(CREATE_OI_OP_SONG, 3, 2, 60, 32, 70, CREATE_OI_OP_STOP, CREATE_OI_OP_PLAY, 3);
+    SEND(CREATE_OI_OP_SCRIPT, 5, CREATE_OI_OP_DRIVE_DIRECT, 0, 200, 0, CREATE_OI_OP_START);
+    SEND(CREATE_OI_OP_PLAY_SCRIPT, CREATE_OI_OP_SHOW_SCRIPT, CREATE_OI_OP_WAIT_TIME, CREATE_OI_OP_START);
+    SEND(CREATE_OI_OP_WAIT_DISTANCE, 0, CREATE_OI_OP_START, CREATE_OI_OP_WAIT_ANGLE, 0, CREATE_OI_OP_START);
+    SEND(CREATE_OI_OP_WAIT_EVENT, CREATE_OI_OP_START);
+    pass_periods(2);
+    assert_int_equal(robot.count, 0);
+    assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_SAFE);
+    SEND(CREATE_OI_OP_DRIVE_DIRECT, 0, 100, 0, 50);
+    assert_speed(100, 50);
+}
+
+static void test_create_2_has_no_scripts(void **state)
+{
+    (void)state;
+    ready(CREATE_OI_V3, CREATE_OI_OP_SAFE);
+    SEND(CREATE_OI_OP_WAIT_TIME, CREATE_OI_OP_FULL);
+    assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_FULL);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_off_obeys_start_alone),         cmocka_unit_test(test_each_mode_command),
-        cmocka_unit_test(test_demo_takes_its_number),         cmocka_unit_test(test_wheels_turn_in_safe_and_full_only),
-        cmocka_unit_test(test_safe_falls_back_to_passive),    cmocka_unit_test(test_full_goes_on),
+        cmocka_unit_test(test_off_obeys_start_alone),
+        cmocka_unit_test(test_each_mode_command),
+        cmocka_unit_test(test_demo_takes_its_number),
+        cmocka_unit_test(test_wheels_turn_in_safe_and_full_only),
+        cmocka_unit_test(test_safe_falls_back_to_passive),
+        cmocka_unit_test(test_full_goes_on),
         cmocka_unit_test(test_an_empty_battery_switches_off),
+        cmocka_unit_test(test_songs_scripts_and_waits_are_read_whole_and_do_nothing),
+        cmocka_unit_test(test_create_2_has_no_scripts),
     };
     return cmocka_run_group_tests(tests, NULL, end_robot);
 }

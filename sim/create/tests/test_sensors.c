@@ -184,17 +184,6 @@ static void test_old_firmware(void **state)
     assert_int_equal(ask(CREATE_OI_MODE, 0), 4);
 }
 
-static void test_songs_take_their_time(void **state)
-{
-    (void)state;
-    ready(CREATE_OI_V2, CREATE_OI_OP_SAFE);
-    SEND(CREATE_OI_OP_SONG, 3, 2, 60, 32, 70, 32, CREATE_OI_OP_PLAY, 3);
-    assert_int_equal(ask(CREATE_OI_SONG_NUMBER, 0), 3);
-    assert_int_equal(ask(CREATE_OI_SONG_PLAYING, 0), 1);
-    pass_ticks(TICKS_PER_S);
-    assert_int_equal(ask(CREATE_OI_SONG_PLAYING, 0), 0);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -208,7 +197,6 @@ int main(void)
         cmocka_unit_test(test_encoders_count_and_wrap),
         cmocka_unit_test(test_battery),
         cmocka_unit_test(test_old_firmware),
-        cmocka_unit_test(test_songs_take_their_time),
     };
     return cmocka_run_group_tests(tests, NULL, end_robot);
 }
