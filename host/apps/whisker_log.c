@@ -79,7 +79,6 @@ static int whisker_log_parse(int argc, char **argv, struct options *options)
 
 static void log_bad_records(struct session *session, const struct whisker_frame *frame)
 {
-    const uint32_t first = frame->flags & WHISKER_FRAME_SECOND ? WHISKER_FRAME_LANES : 0;
     for (uint32_t lane = 0; lane < session->options->lanes; lane++) {
         const unsigned status = frame->lane[lane].status;
         if (status == 0) {
@@ -88,8 +87,8 @@ static void log_bad_records(struct session *session, const struct whisker_frame 
         session->tally.records_bad++;
         if (session->bad) {
             const unsigned errors = status & ((1u << WHISKER_STATUS_ERROR_BITS) - 1);
-            fprintf(session->bad, "%u,%" PRIu64 ",%u,%u\n", first + lane, frame->tick,
-                    status >> WHISKER_STATUS_ERROR_BITS, errors);
+            fprintf(session->bad, "%u,%" PRIu64 ",%u,%u\n", lane, frame->tick, status >> WHISKER_STATUS_ERROR_BITS,
+                    errors);
         }
     }
 }

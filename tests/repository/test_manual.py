@@ -70,7 +70,7 @@ def test_the_help_of_a_program_in_c_is_read_whole(programs):
     options = {option.name: option for option in daemon.options}
     printed = run(next(BUILD.rglob("host/apps/whiskerd")), "--help").stdout
     assert [line.split()[0] for line in printed.splitlines() if line.startswith("  --")] == list(options)
-    assert options["--second"].text.endswith("its lanes are 28 to 55")
+    assert options["--tick-in"].text.endswith("a camera, a PPS")
     assert options["--wait"].value == "" and options["--ring"].value == "NAME"
     assert daemon.usage.splitlines() == ["whiskerd --ring NAME [OPTION...]", "whiskerd --list"]
     assert len(daemon.examples) == 2 and any(line.startswith("Exit code") for line in daemon.notes)

@@ -103,8 +103,8 @@ WITHOUT_HARDWARE = {
     "whiskerd --ring whisker": "no bridge is connected; plug it in",
     "whiskerd --ring whisker --wait": "no bridge is connected; plug it in",
     "whiskerd --ring whisker --wait --verbose": "no bridge is connected; plug it in",
-    "whiskerd --ring whisker --serial 0001 --second 0002": "no bridge of this serial number is connected",
-    "whiskerd --ring whisker --serial 0001 --second 0002 --tick-in rising": "no bridge of this serial number is connected",
+    "whiskerd --ring first --serial 0001": "no bridge of this serial number is connected",
+    "whiskerd --ring second --serial 0002 --tick-in rising": "no bridge of this serial number is connected",
 }
 REASONS = {
     "the example of its help, which test_examples.py runs": (

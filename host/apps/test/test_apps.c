@@ -123,22 +123,6 @@ static void daemon_without_a_bridge_fails_in_one_line(void **state)
     assert_false(ring_exists());
 }
 
-static void assert_second_refused(const char *first, const char *option, const char *value, const char *expected)
-{
-    const char *words[] = {WHISKERD, "--ring", ring_name(), "--second", "0002", option, value, "--serial", first, NULL};
-    words[7] = first ? words[7] : NULL;
-    assert_refused(words, 2, expected);
-}
-
-static void two_bridges_that_cannot_be_one_are_refused(void **state)
-{
-    (void)state;
-    assert_second_refused(NULL, "--batch", "4", "--second: give --serial TEXT");
-    assert_second_refused("0002", "--batch", "4", "--second: it is the bridge of --serial");
-    assert_second_refused("0001", "--second-lane-mask", "0x10000000", "--second-lane-mask: it has lanes above 27");
-    assert_second_refused("0001", "--tick-period", "22499", "give 22500 or more");
-}
-
 /* See fake_bridge.c for what the word makes of the bridge. */
 static const char *const *with_fake(const char *what)
 {
@@ -479,7 +463,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(daemon_without_a_bridge_fails_in_one_line),
-        cmocka_unit_test(two_bridges_that_cannot_be_one_are_refused),
         cmocka_unit_test(bridges_that_cannot_be_used_are_reported_in_one_line),
         cmocka_unit_test(a_host_clock_that_goes_back_is_reported_and_nothing_is_lost),
         cmocka_unit_test(what_is_wrong_with_tick_in_is_reported_once),

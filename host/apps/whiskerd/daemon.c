@@ -11,59 +11,48 @@ struct daemon {
     struct whisker_hotplug *hotplug; /* while a bridge is waited for */
 };
 
-/* Tries each bridge once, the second before the first, whose ticks it counts. False: it is not worth to wait; the
- * reason has been logged. */
-static bool daemon_connect_first(struct daemon *daemon)
+/* Tries once. False: it is not worth to wait; the reason has been logged. */
+static bool daemon_connect_first(struct daemon_stream *stream)
 {
-    struct daemon_stream *stream = &daemon->stream;
     struct whisker_identity identity;
-    for (int i = stream->bridges - 1; i >= 0; i--) {
-        struct daemon_bridge *bridge = &stream->bridge[i];
-        bridge->logged = daemon_stream_connect(stream, i, &identity);
-        if (bridge->logged && !stream->options->wait) {
-            daemon_bridge_log_refusal(bridge, bridge->logged, &identity);
-            return false;
-        }
-        if (bridge->logged) {
-            daemon_log_error(LOG_NOTE, bridge->name, bridge->logged);
-            daemon_notify_ready("waiting for a bridge");
-        }
+    const int error = stream->bridge.logged = daemon_stream_connect(stream, &identity);
+    if (error && !stream->options->wait) {
+        daemon_bridge_log_refusal(error, &identity);
+        return false;
+    }
+    if (error) {
+        daemon_log_error(LOG_NOTE, DAEMON_BRIDGE, error);
+        daemon_notify_ready("waiting for a bridge");
     }
     return true;
 }
 
-/* Tries those that are missing; a reason is logged once, not every second. */
+/* Tries again; a reason is logged once, not every second. */
 static void daemon_connect_again(struct daemon_stream *stream)
 {
+    struct daemon_bridge *bridge = &stream->bridge;
     struct whisker_identity identity;
-    for (int i = stream->bridges - 1; i >= 0; i--) {
-        struct daemon_bridge *bridge = &stream->bridge[i];
-        if (!bridge->device) {
-            const int error = daemon_stream_connect(stream, i, &identity);
-            const bool away =
-                error == WHISKER_ERROR_DEVICE_SERIAL && bridge->lost_at_ms != 0; /* its loss is in the log */
-            if (error && error != bridge->logged && !away) {
-                daemon_bridge_log_refusal(bridge, error, &identity);
-            }
-            bridge->logged = error;
-        }
+    const int error = daemon_stream_connect(stream, &identity);
+    const bool away = error == WHISKER_ERROR_DEVICE_SERIAL && bridge->lost_at_ms != 0; /* its loss is in the log */
+    if (error && error != bridge->logged && !away) {
+        daemon_bridge_log_refusal(error, &identity);
     }
+    bridge->logged = error;
 }
 
-/* While a bridge is missing: looks for it; waits for it only if there is none. Returns 0 or why it cannot even look. */
+/* While the bridge is missing: waits for it. Returns 0 or why it cannot even look. */
 static int daemon_await_bridge(struct daemon *daemon)
 {
     struct daemon_stream *stream = &daemon->stream;
-    const int connected = daemon_stream_connected(stream);
-    if (connected == stream->bridges) {
+    if (stream->bridge.device) {
         whisker_hotplug_close(daemon->hotplug);
         daemon->hotplug = NULL;
         return WHISKER_OK;
     }
     const int error = daemon->hotplug ? WHISKER_OK : whisker_hotplug_open(&daemon->hotplug);
     if (error) {
-        daemon_log_error(LOG_ERROR, "bridge", error);
-    } else if (whisker_hotplug_wait(daemon->hotplug, connected > 0 ? 0 : DAEMON_POLL_MS) == WHISKER_OK) {
+        daemon_log_error(LOG_ERROR, DAEMON_BRIDGE, error);
+    } else if (whisker_hotplug_wait(daemon->hotplug, DAEMON_POLL_MS) == WHISKER_OK) {
         daemon_connect_again(stream);
     }
     return error;
@@ -96,7 +85,7 @@ int daemon_run(const struct daemon_options *options)
         return CLI_FAILED;
     }
     daemon_stream_init(&daemon.stream, options, ring);
-    const bool failed = !daemon_connect_first(&daemon) || daemon_serve(&daemon) != WHISKER_OK;
+    const bool failed = !daemon_connect_first(&daemon.stream) || daemon_serve(&daemon) != WHISKER_OK;
     daemon_notify_stopping();
     whisker_hotplug_close(daemon.hotplug);
     const bool whole = daemon_stream_end(&daemon.stream);

@@ -36,13 +36,13 @@ int daemon_bridge_connect(struct daemon_bridge *bridge, struct daemon_stats *sta
     return error;
 }
 
-void daemon_bridge_log_refusal(const struct daemon_bridge *bridge, int error, const struct whisker_identity *identity)
+void daemon_bridge_log_refusal(int error, const struct whisker_identity *identity)
 {
     if (error == WHISKER_ERROR_WIRE_VERSION) {
-        daemon_log(LOG_ERROR, "%s: %s (bridge %u, host %d); %s", bridge->name, whisker_error_text(error),
+        daemon_log(LOG_ERROR, DAEMON_BRIDGE ": %s (bridge %u, host %d); %s", whisker_error_text(error),
                    identity->wire_version, whisker_wire_version(), whisker_error_remedy(error));
     } else {
-        daemon_log_error(LOG_ERROR, bridge->name, error);
+        daemon_log_error(LOG_ERROR, DAEMON_BRIDGE, error);
     }
 }
 
@@ -53,7 +53,7 @@ void daemon_bridge_lose(struct daemon_bridge *bridge, struct daemon_stats *stats
     whisker_device_close(bridge->device);
     bridge->device = NULL;
     daemon_stats_lost(stats, true, error);
-    daemon_log_error(LOG_WARN, bridge->name, error);
+    daemon_log_error(LOG_WARN, DAEMON_BRIDGE, error);
 }
 
 static void daemon_bridge_report_ticks(struct daemon_bridge *bridge, const struct whisker_timing *now)
@@ -65,8 +65,9 @@ static void daemon_bridge_report_ticks(struct daemon_bridge *bridge, const struc
         bridge->ticks_reported |= bit;
         daemon_log_error(LOG_WARN, "tick_in", error);
         daemon_log(LOG_NOTE,
-                   "%s, tick_in: %u edges taken, %u early, %u uneven, %u silences; shortest distance %u cycles",
-                   bridge->name, now->edges, now->early, now->uneven, now->silent, now->shortest);
+                   DAEMON_BRIDGE
+                   ", tick_in: %u edges taken, %u early, %u uneven, %u silences; shortest distance %u cycles",
+                   now->edges, now->early, now->uneven, now->silent, now->shortest);
     }
 }
 
@@ -81,11 +82,10 @@ void daemon_bridge_look_at_ticks(struct daemon_bridge *bridge, struct whisker_cl
 {
     struct whisker_timing now;
     const bool from_pin = bridge->settings.options & WHISKER_OPTION_TICK_IN;
-    if (!bridge->device || !(from_pin || (clock && bridge->dated)) ||
-        whisker_device_timing(bridge->device, &now) != WHISKER_OK) {
+    if (!bridge->device || !(from_pin || bridge->dated) || whisker_device_timing(bridge->device, &now) != WHISKER_OK) {
         return;
     }
-    if (clock && bridge->dated) {
+    if (bridge->dated) {
         whisker_clock_report(clock, daemon_bridge_cycles(bridge, now.tick), now.usb_time, now.sof_cycles);
     }
     if (from_pin) {
@@ -97,7 +97,7 @@ void daemon_bridge_report_damage(struct daemon_bridge *bridge)
 {
     const struct whisker_decoder *decoder = &bridge->source.decoder;
     if (decoder->first_error && !bridge->damage_reported) {
-        daemon_log(LOG_ERROR, "%s: after frame %llu: %s; %s", bridge->name, (unsigned long long)decoder->counts.frames,
+        daemon_log(LOG_ERROR, DAEMON_BRIDGE ": after frame %llu: %s; %s", (unsigned long long)decoder->counts.frames,
                    whisker_error_text(decoder->first_error), whisker_error_remedy(decoder->first_error));
         bridge->damage_reported = true;
     }

@@ -1,4 +1,4 @@
-/* One bridge of the daemon: opened, started, lost and tried again; what it sends goes to the stream. */
+/* The bridge of the daemon: opened, started, lost and tried again; what it sends goes to the stream. */
 #ifndef WHISKER_DAEMON_BRIDGE_H
 #define WHISKER_DAEMON_BRIDGE_H
 
@@ -7,8 +7,9 @@
 /* The daemon looks about so often. */
 #define DAEMON_POLL_MS 100
 
+#define DAEMON_BRIDGE "bridge" /* in the log */
+
 struct daemon_bridge {
-    const char *name;   /* in the log */
     const char *serial; /* NULL: any */
     struct whisker_settings settings;
     struct whisker_device *device; /* NULL: waiting for it */
@@ -27,13 +28,13 @@ int daemon_bridge_connect(struct daemon_bridge *bridge, struct daemon_stats *sta
                           struct whisker_identity *identity);
 
 /* Logs why it could not be opened. */
-void daemon_bridge_log_refusal(const struct daemon_bridge *bridge, int error, const struct whisker_identity *identity);
+void daemon_bridge_log_refusal(int error, const struct whisker_identity *identity);
 
 /* It has gone, for this reason; what had come is published. */
 void daemon_bridge_lose(struct daemon_bridge *bridge, struct daemon_stats *stats, int error);
 
-/* Asks for the report `timing`, if it is of use: for the clock (NULL: not that of this bridge), and for what is wrong
- * with the pin that the ticks come from, each kind of which is logged once in a run, with the counts. */
+/* Asks for the report `timing`, if it is of use: for the clock, and for what is wrong with the pin that the ticks come
+ * from, each kind of which is logged once in a run, with the counts. */
 void daemon_bridge_look_at_ticks(struct daemon_bridge *bridge, struct whisker_clock_fit *clock);
 
 /* USB guards every packet by a CRC of its own, so a malformed frame is a fault of the bridge: said once, while the

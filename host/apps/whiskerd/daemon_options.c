@@ -6,7 +6,6 @@
 #include "cli.h"
 #include "command_line.h"
 #include "daemon_log.h"
-#include "whisker/pair.h"
 #include "whisker/ring.h"
 
 #define AT(field) offsetof(struct daemon_options, field)
@@ -36,12 +35,6 @@ static const struct command_option OPTIONS[] = {
     {"ring-frames", "N", "its capacity, a power of two", COMMAND_NUMBER, AT(frames), 0, UINT32_MAX, NULL},
     {"serial", "TEXT", "the bridge with this serial number (the first that can be opened)", COMMAND_TEXT, AT(serial), 0,
      0, NULL},
-    {"second", "TEXT",
-     "a second bridge, of this serial number (with --serial): its ticks begin with the\n"
-     "first one's tick_out, or with --tick-in both take the same source; its lanes are\n28 to 55",
-     COMMAND_TEXT, AT(second), 0, 0, NULL},
-    {"second-lane-mask", "M", "bit n set: lane n of the second bridge is in use", COMMAND_MASK, AT(second_lane_mask), 0,
-     UINT32_MAX, NULL},
     {"wait", NULL, "wait for a bridge instead of failing when there is none", COMMAND_FLAG, AT(wait), 0, 0, NULL},
     {"once", NULL, "end when the bridge goes, instead of waiting for it", COMMAND_FLAG, AT(once), 0, 0, NULL},
     {"replace", NULL, "stop the whiskerd that has this ring, if it is yours, root's or the service's, and\ntake over",
@@ -87,23 +80,6 @@ static const struct command_line LINE = {
     .count = sizeof OPTIONS / sizeof *OPTIONS,
 };
 
-/* NULL, or what is wrong with the options of two bridges. */
-static const char *daemon_options_check_second(const struct daemon_options *options)
-{
-    struct whisker_settings second = options->settings;
-    second.lane_mask = options->second_lane_mask;
-    if (!options->second) {
-        return NULL;
-    }
-    return !options->serial                            ? "--second: give --serial TEXT, too: which one is the first"
-           : !strcmp(options->second, options->serial) ? "--second: it is the bridge of --serial; give another one"
-           : whisker_settings_check(&second, NULL, 0)
-               ? "--second-lane-mask: it has lanes above 27; use bits of 0xfffffff"
-           : second.tick_period < WHISKER_PAIR_PERIOD_MIN
-               ? "--second: ticks of two bridges can be matched from a --tick-period of 22500 on; give 22500 or more"
-               : NULL;
-}
-
 static int daemon_options_check(const struct daemon_options *options, bool word_too_many)
 {
     char message[128];
@@ -115,11 +91,6 @@ static int daemon_options_check(const struct daemon_options *options, bool word_
         fprintf(stderr, DAEMON_PROGRAM ": %s\n", message);
         return CLI_USAGE;
     }
-    const char *wrong = daemon_options_check_second(options);
-    if (wrong) {
-        fprintf(stderr, DAEMON_PROGRAM ": %s\n", wrong);
-        return CLI_USAGE;
-    }
     return COMMAND_LINE_READ;
 }
 
@@ -127,7 +98,6 @@ int daemon_options_parse(int argc, char **argv, struct daemon_options *options)
 {
     *options = (struct daemon_options){.frames = WHISKER_RING_FRAMES};
     whisker_settings_default(&options->settings);
-    options->second_lane_mask = options->settings.lane_mask;
     int rest;
     const int result = command_line_read(&LINE, argc, argv, options, &rest);
     return result == COMMAND_LINE_READ ? daemon_options_check(options, rest != argc) : result;

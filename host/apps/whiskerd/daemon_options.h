@@ -10,8 +10,6 @@
 struct daemon_options {
     const char *ring;
     const char *serial; /* NULL: any bridge */
-    const char *second; /* serial number of the second bridge; NULL: there is one bridge */
-    uint32_t second_lane_mask;
     uint32_t frames;
     bool list, wait, once, replace, verbose;
     struct whisker_settings settings;

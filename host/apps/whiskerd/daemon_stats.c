@@ -15,30 +15,23 @@ static int64_t daemon_stats_realtime_ns(void)
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
-void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_settings *settings, int bridges,
-                        uint32_t second_lane_mask)
+void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_settings *settings)
 {
     memset(stats, 0, sizeof *stats);
     stats->reported.started_ns = daemon_stats_realtime_ns();
     stats->reported.lane_mask = settings->lane_mask;
     stats->reported.tick_period = settings->tick_period;
-    stats->reported.bridges = (uint8_t)bridges;
-    stats->reported.second_lane_mask = second_lane_mask;
 }
 
-/* With two bridges the names are those of the first. */
 void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *source,
                             const struct whisker_device_info *about, const struct whisker_identity *identity)
 {
     struct whisker_daemon_stats *reported = &stats->reported;
-    reported->connected++;
-    reported->error = reported->connected == reported->bridges ? WHISKER_OK : reported->error;
+    reported->connected = 1;
+    reported->error = WHISKER_OK;
     reported->connected_ns = daemon_stats_realtime_ns();
     source->dropped = 0;
     source->has_sequence = false;
-    if (source->is_second) {
-        return;
-    }
     reported->wire_version = identity->wire_version;
     reported->gateware = identity->gateware;
     memcpy(reported->serial, about->serial, sizeof reported->serial);
@@ -49,7 +42,7 @@ void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *so
 void daemon_stats_lost(struct daemon_stats *stats, bool was_connected, int error)
 {
     if (was_connected) {
-        stats->reported.connected--;
+        stats->reported.connected = 0;
         stats->reported.connected_ns = daemon_stats_realtime_ns();
         stats->reported.usb_errors += error != WHISKER_ERROR_DEVICE_GONE;
     }
@@ -91,27 +84,16 @@ void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source
     }
 }
 
-void daemon_stats_settle_begin(struct daemon_stats *stats)
-{
-    struct whisker_daemon_stats *reported = &stats->reported;
-    reported->frames = reported->frames_damaged = reported->frames_dropped = reported->bytes_skipped =
-        reported->records_usb = 0;
-}
-
-void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source *source)
+void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source *source,
+                         const struct whisker_clock_fit *clock)
 {
     struct whisker_daemon_stats *reported = &stats->reported;
     const struct whisker_decoder_counts *counts = &source->decoder.counts;
-    reported->frames += counts->frames;
-    reported->frames_damaged += counts->frames_damaged;
-    reported->frames_dropped += source->frames_dropped;
-    reported->bytes_skipped += counts->bytes_skipped;
-    reported->records_usb += counts->records_damaged;
-}
-
-void daemon_stats_settle_end(struct daemon_stats *stats, const struct whisker_clock_fit *clock)
-{
-    struct whisker_daemon_stats *reported = &stats->reported;
+    reported->frames = counts->frames;
+    reported->frames_damaged = counts->frames_damaged;
+    reported->frames_dropped = source->frames_dropped;
+    reported->bytes_skipped = counts->bytes_skipped;
+    reported->records_usb = counts->records_damaged;
     reported->records_crc =
         stats->records_link_crc > reported->records_usb ? stats->records_link_crc - reported->records_usb : 0;
     reported->clock_restarts = clock->restarts;

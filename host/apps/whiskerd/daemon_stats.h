@@ -7,14 +7,13 @@
 
 #include "whisker/whisker.h"
 
-/* What one bridge sends. */
+/* What the bridge sends. */
 struct daemon_source {
     struct whisker_decoder decoder;
     uint64_t frames_dropped; /* by the bridge, in all runs */
     uint32_t dropped;        /* as its latest frame says, of this run */
     uint32_t sequence;       /* of the latest frame */
     bool has_sequence;
-    bool is_second;
 };
 
 struct daemon_stats {
@@ -22,25 +21,21 @@ struct daemon_stats {
     uint64_t records_link_crc; /* found by bridge or host: the frame does not say which */
 };
 
-/* bridges: that the daemon is started for; second_lane_mask: of the second one. */
-void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_settings *settings, int bridges,
-                        uint32_t second_lane_mask);
+void daemon_stats_begin(struct daemon_stats *stats, const struct whisker_settings *settings);
 
-/* A bridge has been started. */
+/* The bridge has been started. */
 void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *source,
                             const struct whisker_device_info *about, const struct whisker_identity *identity);
 
-/* A bridge has gone, or is not there. error: why. */
+/* The bridge has gone, or is not there. error: why. */
 void daemon_stats_lost(struct daemon_stats *stats, bool was_connected, int error);
 
-/* Counts a frame of this bridge. */
+/* Counts a frame. */
 void daemon_stats_frame(struct daemon_stats *stats, struct daemon_source *source, const struct whisker_frame *frame);
 
-/* Takes over what the decoders and the clock fit have counted: begin, each source, end. Then `reported` is up to date.
- */
-void daemon_stats_settle_begin(struct daemon_stats *stats);
-void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source *source);
-void daemon_stats_settle_end(struct daemon_stats *stats, const struct whisker_clock_fit *clock);
+/* Takes over what the decoder and the clock fit have counted. Then `reported` is up to date. */
+void daemon_stats_settle(struct daemon_stats *stats, const struct daemon_source *source,
+                         const struct whisker_clock_fit *clock);
 
 /* Logs it as one line. */
 void daemon_stats_log(const struct whisker_daemon_stats *reported);

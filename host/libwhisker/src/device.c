@@ -1,6 +1,5 @@
 #include "whisker/device.h"
 
-#include <poll.h>
 #include <stdbool.h>
 #include <stdlib.h>
 
@@ -18,9 +17,6 @@
 #define STALE_TIMEOUT_MS 100
 #define STALE_BYTES 4096
 #define STATUS_TIMEOUT_MS 1000
-/* What an open device waits for: libusb's event, its timer, the device. */
-#define DESCRIPTORS_MAX 8
-#define WAIT_MAX 2
 
 struct whisker_device {
     libusb_context *usb;
@@ -34,8 +30,6 @@ struct whisker_device {
     int turn;      /* whose it is */
     int error;     /* why the stream has ended */
     bool ending;   /* do not queue again */
-    struct pollfd descriptor[DESCRIPTORS_MAX]; /* that libusb waits on for this device */
-    int descriptors;
     struct whisker_settings settings;
     struct whisker_counters counted; /* when last asked for */
     whisker_sink sink;
@@ -212,20 +206,6 @@ static int device_queue_transfers(struct whisker_device *device)
     return WHISKER_OK;
 }
 
-static int device_find_descriptors(struct whisker_device *device)
-{
-    const struct libusb_pollfd **list = libusb_get_pollfds(device->usb);
-    if (!list) {
-        return WHISKER_ERROR_MEMORY;
-    }
-    device->descriptors = 0;
-    for (int i = 0; list[i] && i < DESCRIPTORS_MAX; i++) {
-        device->descriptor[device->descriptors++] = (struct pollfd){.fd = list[i]->fd, .events = list[i]->events};
-    }
-    libusb_free_pollfds(list);
-    return WHISKER_OK;
-}
-
 int whisker_device_start(struct whisker_device *device, const struct whisker_settings *settings, whisker_sink sink,
                          void *context)
 {
@@ -242,10 +222,7 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
     device->context = context;
     device->error = WHISKER_OK;
     device->ending = false;
-    error = device_find_descriptors(device);
-    if (!error) {
-        error = device_queue_transfers(device);
-    }
+    error = device_queue_transfers(device);
     return error ? error : device_blame(device, control_run(device->hid, settings, true));
 }
 
@@ -257,18 +234,6 @@ int whisker_device_poll(struct whisker_device *device, int timeout_ms)
     }
     device_handle_events(device, timeout_ms);
     return device->error;
-}
-
-void whisker_device_wait(struct whisker_device *const devices[], int count, int timeout_ms)
-{
-    struct pollfd all[WAIT_MAX * DESCRIPTORS_MAX];
-    nfds_t used = 0;
-    for (int i = 0; i < count && i < WAIT_MAX; i++) {
-        for (int k = 0; k < devices[i]->descriptors; k++) {
-            all[used++] = devices[i]->descriptor[k];
-        }
-    }
-    poll(all, used, timeout_ms);
 }
 
 int whisker_device_stop(struct whisker_device *device)

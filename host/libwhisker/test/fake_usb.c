@@ -280,19 +280,6 @@ int libusb_handle_events_timeout_completed(libusb_context *context, struct timev
     return 0;
 }
 
-const struct libusb_pollfd **libusb_get_pollfds(libusb_context *context)
-{
-    static const struct libusb_pollfd readable = {.fd = 0};
-    static const struct libusb_pollfd *list[] = {&readable, NULL};
-    (void)context;
-    return list;
-}
-
-void libusb_free_pollfds(const struct libusb_pollfd **list)
-{
-    (void)list;
-}
-
 int libusb_bulk_transfer(libusb_device_handle *handle, unsigned char endpoint, unsigned char *bytes, int room,
                          int *count, unsigned timeout_ms)
 {

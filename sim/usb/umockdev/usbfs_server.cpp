@@ -16,9 +16,9 @@ namespace bridge_sim
 namespace
 {
 
-constexpr char BUS_PATH[] = "/devices/pci0000:00/0000:00:14.0/usb1/1-"; // and the port
-constexpr unsigned FIRST_NUMBER = 2;                                    // 1 is the root hub
-constexpr unsigned NUMBERS = 60;                                        // that the device of each port has in turn
+constexpr char DEVICE_PATH[] = "/devices/pci0000:00/0000:00:14.0/usb1/1-1";
+constexpr unsigned FIRST_NUMBER = 2; // 1 is the root hub
+constexpr unsigned NUMBERS = 60;     // that the device has in turn
 
 // A device's number on its bus in three digits, as in the path of its node.
 std::string three_digits(unsigned number)
@@ -74,7 +74,6 @@ struct UsbfsServer::State {
     UsbfsSession session{[this](DeviceRequest request) { post(std::move(request)); }};
     UMockdevTestbed *testbed = nullptr;
     UMockdevIoctlBase *handler = nullptr;
-    unsigned port = 1;
     unsigned plugged = 0;           // times
     unsigned number = 0;            // of the device, now or before it was unplugged
     std::vector<std::string> nodes; // attached; clients of a device that is gone may still hold its node open
@@ -82,11 +81,6 @@ struct UsbfsServer::State {
     ~State()
     {
         close(wake);
-    }
-
-    std::string path() const
-    {
-        return BUS_PATH + std::to_string(port);
     }
 
     void post(DeviceRequest request)
@@ -133,11 +127,10 @@ void UsbfsServer::post(std::function<void()> job)
     g_main_context_invoke_full(state_->context, G_PRIORITY_DEFAULT, on_job, new Job(std::move(job)), free_job);
 }
 
-UsbfsServer::UsbfsServer(const UsbfsServer *beside) : state_(std::make_shared<State>())
+UsbfsServer::UsbfsServer() : state_(std::make_shared<State>())
 {
     state_->wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    state_->port = beside ? beside->state_->port + 1 : 1;
-    state_->testbed = beside ? UMOCKDEV_TESTBED(g_object_ref(beside->state_->testbed)) : umockdev_testbed_new();
+    state_->testbed = umockdev_testbed_new();
     if (!umockdev_in_mock_environment()) {
         throw std::runtime_error("the simulated device needs umockdev: run this program under umockdev-wrapper");
     }
@@ -149,16 +142,16 @@ UsbfsServer::UsbfsServer(const UsbfsServer *beside) : state_(std::make_shared<St
 void UsbfsServer::plug(const Descriptors &descriptors)
 {
     GError *error = nullptr;
-    state_->number = FIRST_NUMBER + (state_->port - 1) * NUMBERS + state_->plugged++ % NUMBERS;
+    state_->number = FIRST_NUMBER + state_->plugged++ % NUMBERS;
     const std::string node = node_of(state_->number);
     require(umockdev_testbed_attach_ioctl(state_->testbed, node.c_str(), state_->handler, &error), error,
             "umockdev does not serve the device node");
     state_->nodes.push_back(node);
     post([session = &state_->session, node] { session->set_node(node); });
-    require(umockdev_testbed_add_from_string(
-                state_->testbed, device_record(descriptors, state_->path(), state_->number).c_str(), &error),
+    require(umockdev_testbed_add_from_string(state_->testbed,
+                                             device_record(descriptors, DEVICE_PATH, state_->number).c_str(), &error),
             error, "umockdev does not take the device");
-    umockdev_testbed_uevent(state_->testbed, ("/sys" + state_->path()).c_str(), "add");
+    umockdev_testbed_uevent(state_->testbed, ("/sys" + std::string(DEVICE_PATH)).c_str(), "add");
 }
 
 // Waits for umockdev's thread: after that no client of this device can hand in another request.
@@ -170,7 +163,7 @@ void UsbfsServer::unplug()
         done.set_value();
     });
     done.get_future().wait();
-    const std::string path = "/sys" + state_->path();
+    const std::string path = "/sys" + std::string(DEVICE_PATH);
     umockdev_testbed_uevent(state_->testbed, path.c_str(), "remove");
     umockdev_testbed_remove_device(state_->testbed, path.c_str());
     unlink(node_of(state_->number).c_str()); // umockdev leaves it

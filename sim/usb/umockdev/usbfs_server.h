@@ -14,9 +14,9 @@ namespace bridge_sim
 class UsbfsServer : public DevicePort
 {
   public:
-    // A fresh testbed without a device; or, beside a server that outlives this one, its testbed and the bus's next
-    // port. Throws std::runtime_error with one line if that fails (for one, outside umockdev-wrapper).
-    explicit UsbfsServer(const UsbfsServer *beside = nullptr);
+    // A fresh testbed without a device. Throws std::runtime_error with one line if that fails (for one, outside
+    // umockdev-wrapper).
+    UsbfsServer();
     ~UsbfsServer() override;
 
     // Adds the device with these descriptors under a number it has not had yet, and notifies udev's listeners.

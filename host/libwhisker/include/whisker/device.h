@@ -137,10 +137,6 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
  * Returns 0, or DEVICE_GONE, DEVICE_USB: the stream has ended. */
 int whisker_device_poll(struct whisker_device *device, int timeout_ms);
 
-/* Waits up to timeout_ms until whisker_device_poll has something to handle for one of these devices, which all belong
- * to this thread; a signal ends the wait. count: at most 2. */
-void whisker_device_wait(struct whisker_device *const devices[], int count, int timeout_ms);
-
 /* Tells the bridge to stop: it makes one more frame, with flag LAST. Poll on to receive it. 0, DEVICE_CONTROL,
  * DEVICE_GONE. */
 int whisker_device_stop(struct whisker_device *device);

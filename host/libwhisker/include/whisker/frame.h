@@ -14,7 +14,6 @@ extern "C" {
 #define WHISKER_FRAME_LANES 28
 #define WHISKER_FRAME_LAST 1            /* bit of flags: the last frame after a stop */
 #define WHISKER_FRAME_GAP 256           /* bit of flags, set by the host: the first frame after the bridge had gone */
-#define WHISKER_FRAME_SECOND 512        /* bit of flags, set by whisker_pair_next: the lanes are 28 to 55 */
 #define WHISKER_FRAME_USB_TIME_SHIFT 16 /* of flags: from this bit on usb_time of the wire, see protocol.md */
 #define WHISKER_STATUS_ERROR_BITS 10    /* of a status, from bit 0: the sensor's errors; above them: the code */
 

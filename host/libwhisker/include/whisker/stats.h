@@ -25,15 +25,13 @@ struct whisker_daemon_stats {
     uint64_t clock_restarts; /* times the clock mapping began anew: bridge started, host clock jumped */
     int64_t started_ns;      /* CLOCK_REALTIME at the daemon's start */
     int64_t connected_ns;    /* CLOCK_REALTIME when the bridge was started or lost; 0: neither yet */
-    uint32_t lane_mask;      /* bit n: lane n of the first bridge is in use */
+    uint32_t lane_mask;      /* bit n: lane n is in use */
     uint32_t tick_period;    /* cycles of the bridge's clock */
-    uint32_t connected;      /* bridges whose frames are coming; 0: waiting */
-    int32_t error;           /* why a bridge is not connected, a code of errors.h; 0 if none is missing */
-    uint8_t wire_version;    /* of the first bridge, as all below */
+    uint32_t connected;      /* 1: its frames are coming; 0: waiting */
+    int32_t error;           /* why the bridge is not connected, a code of errors.h; 0 if it is */
+    uint8_t wire_version;    /* of the bridge, as all below */
     uint8_t gateware;
-    uint8_t bridges; /* that the daemon was started for, 1 or 2 */
-    uint8_t reserved;
-    uint32_t second_lane_mask;             /* bit n: lane n of the second bridge is in use */
+    uint8_t reserved[6];
     char serial[WHISKER_SERIAL_BYTES];     /* ended by a zero */
     char firmware[WHISKER_FIRMWARE_BYTES]; /* as a person reads it */
 };

@@ -7,7 +7,6 @@
 #include "whisker/errors.h"
 #include "whisker/frame.h"
 #include "whisker/gateware.h"
-#include "whisker/pair.h"
 #include "whisker/ring.h"
 #include "whisker/service.h"
 #include "whisker/version.h"

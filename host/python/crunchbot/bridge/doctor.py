@@ -10,12 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from whisker_protocol import WIRE_VERSION
+from whisker_protocol import LANES, WIRE_VERSION
 
 from . import pattern, usbtree
 from .ring import DaemonStats, Reader, RingError, error_line, found_rings, user_name
 from .status import explain
-from .wide import wide
 
 OK, WARN, FAIL = "ok", "warn", "FAIL"
 RULES = (
@@ -150,10 +149,9 @@ def daemon(stats: DaemonStats | None) -> list[Finding]:
     """What whiskerd reports of itself and its bridge."""
     if stats is None:
         return [Finding(WARN, "the ring's writer reports nothing of itself", "none needed if it is a replay")]
-    if stats.connected < max(1, stats.bridges):
+    if not stats.connected:
         text = error_line(stats.error) if stats.error else "; it is still opening its bridge"
-        missing = "no bridge" if not stats.connected else "one bridge of two"
-        return [Finding(FAIL, f"whiskerd runs, but has {missing}: {text}")]
+        return [Finding(FAIL, f"whiskerd runs, but has no bridge: {text}")]
     out = [Finding(OK, f"bridge {stats.serial}, firmware {stats.firmware}, wire version {stats.wire_version}")]
     if stats.wire_version != WIRE_VERSION:
         text = f"bridge speaks wire version {stats.wire_version}, this package {WIRE_VERSION}"
@@ -171,17 +169,16 @@ def daemon(stats: DaemonStats | None) -> list[Finding]:
 
 def samples(reader: Reader, look_s: float) -> list[Finding]:
     """Whether frames arrive, and what ails their lanes."""
-    taken = _watch(reader, look_s)
-    frames = wide(taken)
+    frames = _watch(reader, look_s)
     if len(frames) == 0:
         return [Finding(FAIL, f"no frame in {look_s:g} s", "see the findings above and whiskerd's log")]
     rate = f"{len(frames)} frames in {look_s:g} s"
-    gaps = np.diff(taken["sequence"])
+    gaps = np.diff(frames["sequence"])
     lost = int((gaps[gaps < 1 << 31].astype(np.int64) - 1).clip(0).sum())
     remedy = "free the host's processor; avoid shared USB hubs"
     out = [Finding(WARN, f"{rate}, {lost} lost", remedy) if lost else Finding(OK, f"{rate}, none lost")]
     mask = int(frames["lane_mask"][-1])
-    for lane in (n for n in range(frames["lane"].shape[1]) if mask >> n & 1):
+    for lane in (n for n in range(LANES) if mask >> n & 1):
         status = frames["lane"]["status"][:, lane]
         counted = Counter(status[status != 0].tolist())
         if counted:

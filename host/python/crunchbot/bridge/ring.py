@@ -174,8 +174,6 @@ class DaemonStats:
     error: int
     wire_version: int
     gateware: int
-    bridges: int
-    second_lane_mask: int
     serial: str
     firmware: str
 
@@ -309,12 +307,6 @@ class Reader:
         if lib.whisker_reader_stats(self._reader, stats) != 0 or stats.started_ns == 0:
             return None
         return DaemonStats(*(_plain(getattr(stats, field)) for field in DaemonStats.__dataclass_fields__))
-
-    @property
-    def two_bridges(self) -> bool:
-        """Whether frames of a second bridge are among those of the ring (crunchbot.bridge.wide), or may come."""
-        stats = self.stats
-        return stats is not None and stats.bridges > 1
 
 
 def await_reader(name: str, wait_s: float, stop: threading.Event, owner: int | None = None) -> Reader:

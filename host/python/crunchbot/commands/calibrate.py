@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
+from whisker_protocol import LANES
+
 from ..arguments import add_ring, number_above, number_list, warn, whole_number
 from ..bridge.nodes import NodeError, read_nodes
 from ..bridge.ring import Reader
-from ..bridge.wide import LANES_MAX
 from ..scene import load
 from ..tables import unwritable
 from ..touch.calibration import (
     TICKS_PER_S,
-    CalibrationError,
     ContactsFile,
     Feed,
     Rest,
@@ -37,7 +37,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--out", required=True, type=Path, metavar="DIR", help="writes rest.toml, and <lane>.csv with --lane"
     )
     parser.add_argument(
-        "--lane", type=whole_number(0, LANES_MAX - 1), metavar="N", help="the whisker to press against the post"
+        "--lane", type=whole_number(0, LANES - 1), metavar="N", help="the whisker to press against the post"
     )
     parser.add_argument(
         "--radii", type=number_list, metavar="LIST", help="distances of the post in mm, as in 90,100,110"
@@ -63,16 +63,12 @@ def run(arguments: argparse.Namespace) -> int:
     if (arguments.lane is None) != (arguments.radii is None):
         arguments.parser.error("--lane and --radii belong together: give both, or neither to measure rest alone")
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
-    names += [f"lane{n}" for n in range(len(names), LANES_MAX)]
+    names += [f"lane{n}" for n in range(len(names), LANES)]
     node = _node(arguments)
     try:
         arguments.out.mkdir(parents=True, exist_ok=True)
         with Reader(arguments.ring, arguments.wait, arguments.ring_owner) as reader:
             feed = Feed(reader)
-            if (arguments.lane or 0) >= feed.lanes:
-                raise CalibrationError(
-                    f"--lane {arguments.lane}: the ring has one bridge; give a lane up to {feed.lanes - 1}"
-                )
             if not arguments.backlog:
                 feed.skip()
             return _calibrate(arguments, feed, names, node)

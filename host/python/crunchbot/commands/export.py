@@ -3,8 +3,9 @@
 import argparse
 from pathlib import Path
 
+from whisker_protocol import LANES
+
 from ..arguments import lane_list, warn
-from ..bridge.wide import LANES_MAX
 from ..recording import read
 from ..recording.exporting import FORMATS, export
 from ..recording.table import ExportError, Table
@@ -17,7 +18,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = f"to be written; the format is that of its ending: {', '.join(FORMATS)}"
     parser.add_argument("out", type=Path, metavar="OUT", help=text)
     text = "such as 0,2,5-7 (default: those in use)"
-    parser.add_argument("--lanes", type=lane_list(LANES_MAX), metavar="LIST", help=text)
+    parser.add_argument("--lanes", type=lane_list(LANES), metavar="LIST", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace OUT if it exists")
     parser.set_defaults(run=run)
 

@@ -8,6 +8,8 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from types import SimpleNamespace
 
+from whisker_protocol import LANES
+
 from ..arguments import RING, add_ring_owner, whole_number
 from ..bridge.nodes import NodeError
 from ..bridge.ring import Reader
@@ -90,6 +92,8 @@ def _body(arguments) -> tuple:
     """The scene and the models of its robot (scene, texture, radial), read before anything is waited for."""
     scene = load(arguments.scene)
     robot = scene.robot
+    if len(robot.whiskers) > LANES:
+        raise UserError(f"{arguments.scene}: its robot has {len(robot.whiskers)} whiskers; a bridge has {LANES} lanes")
     texture, radial = load_models(arguments.models, robot)
     if arguments.nodes:
         check_nodes(arguments.nodes, robot, radial)

@@ -12,7 +12,6 @@ from whisker_protocol import LANES, LIMITS
 
 from ..arguments import add_ring, lane_list, whole_number
 from ..bridge.ring import Reader, await_reader
-from ..bridge.wide import LANES_MAX, SECOND, wide
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker stream --lanes 0-5 --every 20 --frames 100 > drive.csv"
@@ -22,12 +21,8 @@ STOP_S = 0.5  # how soon a signal is noticed when no frames come
 
 def add(parser: argparse.ArgumentParser) -> None:
     add_ring(parser)
-    parser.add_argument(
-        "--lanes",
-        type=lane_list(LANES_MAX),
-        metavar="LIST",
-        help="such as 0,2,5-7 (default: the lane mask); 28 to 55: of the second bridge",
-    )
+    text = "such as 0,2,5-7 (default: the lane mask)"
+    parser.add_argument("--lanes", type=lane_list(LANES), metavar="LIST", help=text)
     text = "print one frame in N, those whose tick is a multiple of N (not filtered: what is faster folds down)"
     parser.add_argument("--every", type=whole_number(1), default=1, metavar="N", help=text)
     parser.add_argument("--frames", type=whole_number(1), metavar="N", help="stop after so many")
@@ -45,12 +40,9 @@ def run(arguments: argparse.Namespace) -> int:
         if not arguments.backlog:
             reader.seek_latest(0)
         lanes, header = arguments.lanes, not arguments.json
-        two = reader.two_bridges or max(lanes or [0]) >= LANES
-        for taken in batches(reader, stop):
-            two = two or bool((taken["flags"] & SECOND).any())
-            frames = wide(taken, two)
+        for frames in batches(reader, stop):
             if lanes is None:
-                lanes = [n for n in range(frames["lane"].shape[1]) if int(frames["lane_mask"][0]) >> n & 1]
+                lanes = [n for n in range(LANES) if int(frames["lane_mask"][0]) >> n & 1]
             if header:
                 print(",".join(["tick", "t_s", "sequence", *(f"lane{n}_{f}" for n in lanes for f in FIELDS)]))
                 header = False

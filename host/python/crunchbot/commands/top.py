@@ -13,12 +13,11 @@ from collections import Counter, deque
 
 import numpy as np
 
-from whisker_protocol import LIMITS
+from whisker_protocol import LANES, LIMITS
 
 from ..arguments import add_ring, number_above
 from ..bridge.ring import FRAME, Reader, RingError, await_reader
 from ..bridge.status import explain
-from ..bridge.wide import LANES_MAX, wide
 from ..scene import load
 from ..stopping import stop_on_signals
 
@@ -94,7 +93,7 @@ class View:
 
     def __init__(self, reader: Reader, names: list[str]):
         self._reader = reader
-        self._names = names + [f"lane{n}" for n in range(len(names), LANES_MAX)]
+        self._names = names + [f"lane{n}" for n in range(len(names), LANES)]
         self._kept: deque[np.ndarray] = deque()
         self.open = True
 
@@ -116,7 +115,7 @@ class View:
 
     def lines(self, width: int) -> list[str]:
         """The picture, no line longer than `width`."""
-        frames = wide(np.concatenate(self._kept)) if self._kept else np.empty(0, FRAME)
+        frames = np.concatenate(self._kept) if self._kept else np.empty(0, FRAME)
         lanes = _lanes(int(frames["lane_mask"][-1])) if len(frames) else []
         room = max(0, min(60, width - len(HEAD)))
         heading = f"{HEAD}alpha over {WINDOW_S:g} s"
@@ -129,8 +128,6 @@ class View:
         out = [f"ring {self._reader.name} of user {self._reader.owner}: {_rate(frames):.1f} frames/s, {lost}; q quits"]
         if stats:
             state = "connected" if stats.connected else "no bridge"
-            if stats.bridges > 1:
-                state = f"and a second one: {stats.connected} of {stats.bridges} connected"
             text = f"bridge {stats.serial} {state}, wire version {stats.wire_version}, {stats.reconnects} reconnects"
             out.append(text + (f", clock +-{clock.uncertainty_ns / 1000:.0f} us" if clock else ""))
         return out
@@ -171,4 +168,4 @@ def _rate(frames: np.ndarray) -> float:
 
 
 def _lanes(mask: int) -> list[int]:
-    return [n for n in range(LANES_MAX) if mask >> n & 1]
+    return [n for n in range(LANES) if mask >> n & 1]

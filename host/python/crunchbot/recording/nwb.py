@@ -44,7 +44,7 @@ def write(table: Table, path: Path, note: Callable[[int], None]) -> None:
 
 def _columns(table: Table, place: Path, note: Callable[[int], None]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times (n,) in s from the first frame, angles (lanes, n, 2) and states (lanes, n), in files of this folder."""
-    n, lanes = table.ticks, len(table.names)
+    n, lanes = table.frames, len(table.names)
     times_s = open_memmap(place / "times", "w+", np.float64, (n,))
     deg = open_memmap(place / "deg", "w+", np.float32, (lanes, n, 2))
     status = open_memmap(place / "status", "w+", np.uint16, (lanes, n))

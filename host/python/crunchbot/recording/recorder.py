@@ -113,8 +113,7 @@ class Recorder:
         self._say_gaps(time_ns, block)
         self._writer.block(time_ns, block)
         self.tally.frames += len(block["tick"])
-        first = block["flags"] & lib.WHISKER_FRAME_SECOND == 0
-        self.tally.records_bad += np.count_nonzero(block["lanes"]["status"][:, first], axis=1)
+        self.tally.records_bad += np.count_nonzero(block["lanes"]["status"], axis=1)
 
     def _say_lost(self, tick: int) -> None:
         """Tell of frames overrun and of a new ring, now that a frame stands behind them."""
@@ -127,8 +126,7 @@ class Recorder:
         ticks, sequence = block["tick"], block["sequence"]
         before = self._last or (int(ticks[0]) - 1, int(sequence[0]) - 1)
         self._last = (int(ticks[-1]), int(sequence[-1]))
-        second = block["flags"] & lib.WHISKER_FRAME_SECOND != 0  # may follow a frame of its own tick
-        back = np.diff(ticks.astype(np.int64), prepend=np.int64(before[0])) < np.where(second, 0, 1)
+        back = np.diff(ticks.astype(np.int64), prepend=np.int64(before[0])) < 1
         back |= block["flags"] & lib.WHISKER_FRAME_GAP != 0
         back[0] |= self._reattached
         steps = np.diff(sequence, prepend=np.uint32(before[1] & 0xFFFFFFFF))

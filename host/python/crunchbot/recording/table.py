@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..bridge.wide import LANES_MAX, SECOND, wide
+from whisker_protocol import LANES
+
 from ..errors import UserError
 from .reading import Recording
 
@@ -40,22 +41,16 @@ class Rows:
 
 
 class Table:
-    """The rows of a recording. lanes: which; None: those that the bridge had in use. ExportError: one it does not have."""
+    """The rows of a recording. lanes: which; None: those that the bridge had in use."""
 
     def __init__(self, recording: Recording, lanes: list[int] | None = None):
         self.recording = recording
-        self.frames = self.ticks = self.first_ns = mask = 0
-        self._is_wide = False
+        self.frames = self.first_ns = mask = 0
         for stamp_ns, frames in recording.stamped_blocks():
             self.first_ns = self.first_ns or stamp_ns
-            self._is_wide = self._is_wide or bool((frames["flags"] & SECOND).any())
-            rows = wide(frames, self._is_wide)
-            mask |= int(np.bitwise_or.reduce(rows["lane_mask"]))
-            self.frames, self.ticks = self.frames + len(frames), self.ticks + len(rows)
-        most = LANES_MAX if self._is_wide else LANES_MAX // 2
-        self.lanes = [n for n in range(most) if mask >> n & 1] if lanes is None else lanes
-        if beyond := [n for n in self.lanes if n >= most]:
-            raise ExportError(f"{recording.path}: has no lane {beyond[0]}; give lanes from 0 to {most - 1}")
+            mask |= int(np.bitwise_or.reduce(frames["lane_mask"]))
+            self.frames += len(frames)
+        self.lanes = [n for n in range(LANES) if mask >> n & 1] if lanes is None else lanes
         self.names = [self._name(n) for n in self.lanes]
 
     def _name(self, lane: int) -> str:
@@ -66,12 +61,11 @@ class Table:
     def rows(self, note: Callable[[int], None] = lambda frames: None) -> Iterator[Rows]:
         """All rows, in the order they were published; note: called with the number of frames that are done."""
         for stamp_ns, frames in self.recording.stamped_blocks():
-            rows = wide(frames, self._is_wide)
-            cycles = (rows["time_cycles"] - frames["time_cycles"][0]).astype(np.int64)
+            cycles = (frames["time_cycles"] - frames["time_cycles"][0]).astype(np.int64)
             time_ns = stamp_ns + np.rint(cycles * (1e9 / self.recording.clock_hz)).astype(np.int64)
-            lane = rows["lane"][:, self.lanes]
+            lane = frames["lane"][:, self.lanes]
             counts = np.stack([lane[axis] for axis in AXES], axis=-1).astype(np.float32)
             deg = (counts - REST_COUNT) * np.float32(DEGREES_PER_COUNT)
             deg[lane["status"] != 0] = np.nan
-            yield Rows(time_ns, rows["tick"], rows["sequence"], deg, lane["status"])
+            yield Rows(time_ns, frames["tick"], frames["sequence"], deg, lane["status"])
             note(len(frames))

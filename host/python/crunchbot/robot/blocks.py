@@ -5,10 +5,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from whisker_protocol import CODES, LANES, STATUS_CODE_SHIFT
+from whisker_protocol import CODES, STATUS_CODE_SHIFT
 
 from ..bridge.ring import Reader, RingError
-from ..bridge.wide import of_first, wide
 from ..pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
 
 LOST = CODES["absent"] << STATUS_CODE_SHIFT  # status of a tick that never came
@@ -51,16 +50,10 @@ class Assembler:
         self._block["status"] = LOST
 
 
-def rows(frames: np.ndarray, lanes: int) -> np.ndarray:
-    """A row for each tick with at least so many lanes: the first bridge's frames, or both bridges' where it takes both."""
-    return wide(frames, two=True) if lanes > LANES else of_first(frames)
-
-
 def blocks(reader: Reader, lanes: int) -> Iterator[Block]:
     """All blocks until the ring is closed. The last may be short."""
     assembler = Assembler(lanes)
-    for view in reader.frames():
-        frames = rows(view, lanes)
+    for frames in reader.frames():
         yield from assembler.feed(frames["tick"].astype(np.int64), frames["lane"])
     yield from assembler.rest()
 
@@ -99,7 +92,6 @@ class LiveRing:
         if frames is None:
             self.trouble, self._attached = f"ring {self.name}: whiskerd closed it; start whiskerd", False
             return []
-        frames = rows(frames, self._lanes)
         return [] if len(frames) == 0 else self._assemble(frames)
 
     def _attach(self, wait_s: float) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 from whisker_protocol import LANES, LIMITS
 
 from ..bridge.ring import FRAME, Reader
-from ..bridge.wide import LANES_MAX, wide
 from ..errors import UserError
 from .contact import ONSET_COUNTS, Contact
 from .texture.spectral import SENSOR_STOPS
@@ -65,9 +64,8 @@ class Feed:
     """New frames of a ring, in order; CalibrationError when they cannot be used to measure with."""
 
     def __init__(self, reader: Reader):
-        self._reader, self._two = reader, reader.two_bridges
-        self.lanes = LANES_MAX if self._two else LANES
-        self._left = wide(np.empty(0, FRAME), self._two)  # taken but not asked for yet
+        self._reader = reader
+        self._left = np.empty(0, FRAME)  # taken but not asked for yet
 
     def skip(self) -> None:
         """Forget what came up to now."""
@@ -84,7 +82,7 @@ class Feed:
             raise CalibrationError(f"ring {self._reader.name}: closed; start whiskerd again and calibrate again")
         if len(frames) == 0:
             raise CalibrationError(f"ring {self._reader.name}: no frames for {QUIET_S:g} s; see whisker doctor")
-        return wide(frames, self._two)
+        return frames
 
     def frames(self, count: int) -> np.ndarray:
         """The next `count` frames."""
@@ -100,7 +98,7 @@ def measure_rest(frames: np.ndarray) -> list[Rest]:
     """Rest of every lane in the mask, from frames (n,) during which nothing touched it."""
     mask = int(np.bitwise_and.reduce(frames["lane_mask"]))
     found = []
-    for lane in (n for n in range(frames["lane"].shape[1]) if mask >> n & 1):
+    for lane in (n for n in range(LANES) if mask >> n & 1):
         samples = frames["lane"][:, lane]
         good = samples[samples["status"] == 0]
         counts = counts_of(good)

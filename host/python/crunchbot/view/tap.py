@@ -10,7 +10,6 @@ import numpy as np
 from whisker_protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
 
 from ..bridge.ring import Reader, RingError, error_line
-from ..bridge.wide import of_first
 from .pyramid import BINS, CHUNK, WIDTHS, Pyramid
 from .tally import NAME_OF_CODE, Tally
 
@@ -94,8 +93,7 @@ class Tap:
                     return
                 self._say("the writer overtook this view: frames are missing here, but were in the ring")
             else:
-                if len(frames := of_first(frames)):
-                    self._take(frames, now)
+                self._take(frames, now)
 
     def _end(self, error: RingError, now: float) -> None:
         """The ring gives nothing more: its writer closed it, or died, or has made a new one."""

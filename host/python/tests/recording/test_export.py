@@ -11,7 +11,6 @@ from commandkit import run, signals_as_before  # noqa: F401
 from rings import make_frames
 from test_recording import write
 
-from crunchbot.bridge.wide import SECOND
 from crunchbot.recording import read
 from crunchbot.recording.table import Table
 from whisker_protocol import CODES, STATUS_CODE_SHIFT
@@ -90,26 +89,11 @@ def test_nwb_is_valid_and_whole(capsys, recording, frames, tmp_path):
         assert file.session_start_time.timestamp() == pytest.approx(first_ns * 1e-9, abs=1e-5)
 
 
-def test_two_bridges_are_one_row_a_tick(capsys, tmp_path):
-    pairs = np.repeat(make_frames(400), 2)
-    pairs["sequence"] = np.arange(800)
-    pairs["flags"][1::2] |= SECOND
-    pairs["lane_mask"] = 0b10
-    pairs["lane"]["alpha"][1::2, 1] = 40_000
-    pairs["lane"]["status"] = 0
-    write(tmp_path / "two.mcap", pairs)
-    assert run(capsys, "export", tmp_path / "two.mcap", tmp_path / "two.nwb")[0] == 0
-    with pynwb.NWBHDF5IO(tmp_path / "two.nwb", "r") as io:
-        series = io.read().acquisition
-        assert sorted(series) == ["lane1", "lane1_status", "lane29", "lane29_status"]
-        np.testing.assert_allclose(series["lane29"].data[:, 0], np.full(400, (40_000 - 32768) * 180 / 65536), atol=1e-4)
-
-
 @pytest.mark.parametrize(
     ("out", "more", "wanted"),
     [
         ("a.txt", (), "not a format; end the name in .csv, .parquet, .nwb"),
-        ("a.csv", ("--lanes", "30"), "has no lane 30; give lanes from 0 to 27"),
+        ("a.csv", ("--lanes", "30"), "is no lane; give lanes from 0 to 27"),
         ("nosuch/a.parquet", (), "cannot be written"),
         ("nosuch/a.nwb", (), "cannot be written"),
     ],

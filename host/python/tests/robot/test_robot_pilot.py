@@ -21,6 +21,7 @@ from crunchbot.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, Flight,
 from crunchbot.robot.wheels import MODE, RETRY_S, LiveBase, Report, wheels_of
 from crunchbot.touch.radial.model import RadialModel
 from crunchbot_lab.simulation.scenes import make_scene
+from whisker_protocol import LANES
 
 
 class Clock:
@@ -272,6 +273,13 @@ def test_a_base_that_goes_is_reported_and_found_again(monkeypatch):
     assert np.diag(report.covariance).tolist() == [1.0, 2.0, 3.0] and base.trouble == ""
     monkeypatch.setattr(Driver, "alive", False)
     assert wheels.odometry(799).bumps == LOST and base.lost == 1
+
+
+def test_a_robot_with_more_whiskers_than_lanes_is_refused(monkeypatch, capsys):
+    crowd = SimpleNamespace(robot=SimpleNamespace(whiskers=[None] * (LANES + 1)))
+    monkeypatch.setattr(pilot_command, "load", lambda folder: crowd)
+    code, _, err = run(capsys, "pilot", "crowd", "--models", "models", "--base", "base.sock")
+    assert code == 2 and err == "whisker: crowd: its robot has 29 whiskers; a bridge has 28 lanes\n"
 
 
 def test_every_order_reaches_the_base(monkeypatch):
