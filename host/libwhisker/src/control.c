@@ -121,27 +121,11 @@ int control_flash(hid_device *hid, uint8_t *report)
     return control_get_report(hid, WHISKER_REPORT_ID_FLASH, report, WHISKER_REPORT_FLASH_BYTES);
 }
 
-void control_parse_counters(const uint8_t *bytes, struct whisker_counters *counters)
-{
-    *counters = (struct whisker_counters){
-        .running = bytes[WHISKER_REPORT_COUNTERS_RUNNING],
-        .ticks = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_TICKS),
-        .frames = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_FRAMES),
-        .dropped = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_DROPPED),
-        .records_good = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_GOOD),
-        .records_absent = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_ABSENT),
-        .records_crc = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_CRC),
-        .records_tick = whisker_get_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_TICK),
-    };
-}
-
-int control_counters(hid_device *hid, struct whisker_counters *counters)
+int control_is_running(hid_device *hid, bool *running)
 {
     uint8_t bytes[WHISKER_REPORT_COUNTERS_BYTES];
     const int error = control_get_report(hid, WHISKER_REPORT_ID_COUNTERS, bytes, sizeof bytes);
-    if (!error) {
-        control_parse_counters(bytes, counters);
-    }
+    *running = !error && bytes[WHISKER_REPORT_COUNTERS_RUNNING] != 0;
     return error;
 }
 

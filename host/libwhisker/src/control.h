@@ -18,9 +18,6 @@ void control_close(hid_device *hid);
  * DEVICE_IDENTITY. */
 int control_parse_identity(const uint8_t *bytes, struct whisker_identity *identity);
 
-/* The counters report's bytes as a struct. */
-void control_parse_counters(const uint8_t *bytes, struct whisker_counters *counters);
-
 /* Reads who the bridge is and compares. Returns 0, WIRE_VERSION, DEVICE_IDENTITY, DEVICE_CONTROL. */
 int control_identify(hid_device *hid, struct whisker_identity *identity);
 
@@ -42,7 +39,7 @@ int control_flash(hid_device *hid, uint8_t *report);
 /* Reads the report `timing`. Returns 0 or DEVICE_CONTROL. */
 int control_timing(hid_device *hid, struct whisker_timing *timing);
 
-/* Reads the counters. Returns 0 or DEVICE_CONTROL. */
-int control_counters(hid_device *hid, struct whisker_counters *counters);
+/* Whether the bridge runs, by the report `counters`. Returns 0 or DEVICE_CONTROL. */
+int control_is_running(hid_device *hid, bool *running);
 
 #endif

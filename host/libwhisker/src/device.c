@@ -31,7 +31,6 @@ struct whisker_device {
     int error;     /* why the stream has ended */
     bool ending;   /* do not queue again */
     struct whisker_settings settings;
-    struct whisker_counters counted; /* when last asked for */
     whisker_sink sink;
     void *context;
     uint8_t buffer[QUEUED_BYTES];
@@ -174,9 +173,9 @@ static int device_stop(struct whisker_device *device)
 /* A process that was killed leaves the bridge running and its FIFO full. */
 static int device_discard_stale(struct whisker_device *device)
 {
-    struct whisker_counters counters;
-    int error = control_counters(device->hid, &counters);
-    if (error || !counters.running) {
+    bool running;
+    int error = control_is_running(device->hid, &running);
+    if (error || !running) {
         return error;
     }
     error = device_stop(device);
@@ -217,7 +216,6 @@ int whisker_device_start(struct whisker_device *device, const struct whisker_set
         return error;
     }
     device->settings = *settings;
-    device->counted.ticks = device->counted.frames = device->counted.dropped = 0;
     device->sink = sink;
     device->context = context;
     device->error = WHISKER_OK;
@@ -239,29 +237,6 @@ int whisker_device_poll(struct whisker_device *device, int timeout_ms)
 int whisker_device_stop(struct whisker_device *device)
 {
     return device_blame(device, device_stop(device));
-}
-
-static void device_widen(uint64_t *counted, uint64_t now)
-{
-    *counted += (uint32_t)(now - *counted);
-}
-
-int whisker_device_counters(struct whisker_device *device, struct whisker_counters *counters)
-{
-    struct whisker_counters now, *counted = &device->counted;
-    const int error = device_blame(device, control_counters(device->hid, &now));
-    if (!error) {
-        counted->running = now.running;
-        device_widen(&counted->ticks, now.ticks);
-        device_widen(&counted->frames, now.frames);
-        device_widen(&counted->dropped, now.dropped);
-        device_widen(&counted->records_good, now.records_good);
-        device_widen(&counted->records_absent, now.records_absent);
-        device_widen(&counted->records_crc, now.records_crc);
-        device_widen(&counted->records_tick, now.records_tick);
-        *counters = *counted;
-    }
-    return error;
 }
 
 int whisker_device_timing(struct whisker_device *device, struct whisker_timing *timing)

@@ -329,9 +329,6 @@ int hid_get_feature_report(hid_device *device, unsigned char *bytes, size_t room
         return (int)room;
     }
     bytes[WHISKER_REPORT_COUNTERS_RUNNING] = fake.running;
-    for (uint32_t i = 0; i <= (WHISKER_REPORT_COUNTERS_RECORDS_TICK - WHISKER_REPORT_COUNTERS_TICKS) / 4; i++) {
-        whisker_put_u32(bytes + WHISKER_REPORT_COUNTERS_TICKS + 4 * i, fake.counted + i);
-    }
     return (int)room;
 }
 

@@ -21,8 +21,7 @@ struct fake_usb {
     int identity_bytes;
     uint8_t timing[32];
     bool running;
-    uint32_t counted; /* ticks; each of the other counters is one more than the one before */
-    int stale_reads;  /* bulk reads that still give data after a stop */
+    int stale_reads; /* bulk reads that still give data after a stop */
     /* what the library did */
     int opened;    /* contexts, handles, interfaces, HID handles and transfers not given back */
     int hid_exits; /* ends of hidapi */

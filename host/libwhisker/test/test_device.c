@@ -196,13 +196,11 @@ static void arrivals_are_reported_by_event_and_by_looking(void **state)
 static void a_bridge_gone_before_its_start_is_reported_so(void **state)
 {
     (void)state;
-    struct whisker_counters counters;
     struct whisker_settings settings;
     whisker_settings_default(&settings);
     open_good();
     fake.gone = true;
     assert_int_equal(whisker_device_start(device, &settings, sink, &device), WHISKER_ERROR_DEVICE_GONE);
-    assert_int_equal(whisker_device_counters(device, &counters), WHISKER_ERROR_DEVICE_GONE);
     assert_int_equal(whisker_device_stop(device), WHISKER_ERROR_DEVICE_GONE);
     close_and_check();
     assert_not_opened(WHISKER_ERROR_DEVICE_GONE);
@@ -413,44 +411,6 @@ static void unplugging_and_failing_end_the_stream(void **state)
     }
 }
 
-static void assert_counted(uint64_t run, uint64_t records)
-{
-    struct whisker_counters counters;
-    assert_int_equal(whisker_device_counters(device, &counters), 0);
-    const uint64_t all[] = {counters.ticks,          counters.frames,      counters.dropped,     counters.records_good,
-                            counters.records_absent, counters.records_crc, counters.records_tick};
-    for (uint64_t i = 0; i < sizeof all / sizeof all[0]; i++) {
-        assert_int_equal(all[i], (i < 3 ? run : records) + i);
-    }
-}
-
-static void counters_are_read_and_go_on_where_the_bridge_wraps(void **state)
-{
-    (void)state;
-    const uint64_t wrap = UINT64_C(1) << 32;
-    struct whisker_counters counters;
-    struct whisker_settings settings;
-    whisker_settings_default(&settings);
-    open_good();
-    fake.running = true;
-    assert_int_equal(whisker_device_counters(device, &counters), 0);
-    assert_int_equal(counters.running, 1);
-    fake.counted = 0x01020304;
-    assert_counted(0x01020304, 0x01020304);
-    fake.counted = 0xF0000000;
-    assert_counted(0xF0000000, 0xF0000000);
-    fake.counted = 5;
-    assert_counted(wrap + 5, wrap + 5);
-    fake.counted = 4; /* nearly all the way round */
-    assert_counted(2 * wrap + 4, 2 * wrap + 4);
-    fake.running = false;
-    assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
-    fake.counted = 9; /* ticks, frames and dropped count from the start */
-    assert_counted(9, 2 * wrap + 9);
-    whisker_device_flush(device);
-    close_and_check();
-}
-
 static void assert_setting(struct whisker_settings settings, const char *complaint)
 {
     char message[128] = "";
@@ -511,7 +471,6 @@ int main(void)
         WITH_BRIDGE(flush_delivers_what_a_transfer_already_held),
         WITH_BRIDGE(refused_settings_are_reported),
         WITH_BRIDGE(unplugging_and_failing_end_the_stream),
-        WITH_BRIDGE(counters_are_read_and_go_on_where_the_bridge_wraps),
         WITH_BRIDGE(the_identity_names_board_and_build),
         WITH_BRIDGE(options_go_to_the_bridge_and_unknown_ones_do_not),
         WITH_BRIDGE(the_timing_report_is_read_as_it_is),

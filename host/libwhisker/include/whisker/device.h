@@ -65,20 +65,6 @@ struct whisker_timing {
     uint32_t shortest;
 };
 
-/* The bridge's own counts: ticks, frames and dropped since its start, records since power came. The bridge has 32 bits
- * of each, which wrap; here they go on, if they are asked for at least once in the time of a wrap: 21 hours of 28 lanes
- * at 2 kHz. Wraps before the bridge was opened are not counted. */
-struct whisker_counters {
-    uint8_t running;
-    uint64_t ticks;
-    uint64_t frames;
-    uint64_t dropped;
-    uint64_t records_good;
-    uint64_t records_absent;
-    uint64_t records_crc;
-    uint64_t records_tick;
-};
-
 /* The hardware's defaults (all 28 lanes, 500 us), and batches of 4: frames wait 2 ms at most for their transfer. */
 void whisker_settings_default(struct whisker_settings *settings);
 
@@ -143,9 +129,6 @@ int whisker_device_stop(struct whisker_device *device);
 
 /* Ends the stream: bytes of transfers that were not yet full still reach the sink. */
 void whisker_device_flush(struct whisker_device *device);
-
-/* Asks for the bridge's counters; also while frames stream. 0, DEVICE_CONTROL, DEVICE_GONE. */
-int whisker_device_counters(struct whisker_device *device, struct whisker_counters *counters);
 
 /* Asks when the latest tick was and how tick_in does; also while frames stream. 0, DEVICE_CONTROL (also of gateware
  * before version 3), DEVICE_GONE. */

@@ -152,11 +152,6 @@ int whisker_ring_signal_writer(const char *name, int number);
  * RING_NAME, RING_OWNER, RING_LAYOUT, RING_ACCESS, SYSTEM, ARGUMENT (no room). */
 int whisker_ring_nodes(const char *name, uint32_t owner, char *text, size_t room, int64_t *written_ns);
 
-/* Removes a ring of WHISKER_RING_DIRECTORY whose writer died; the next writer of its name does so, too. Returns 0, or
- * RING_MISSING, RING_BUSY (its writer lives), RING_LAYOUT (no ring), RING_NAME, RING_ACCESS (another user's), SYSTEM.
- */
-int whisker_ring_remove_stale(const char *name);
-
 struct whisker_ring;
 
 /*

@@ -205,17 +205,6 @@ static int ring_file_remove_unlocked(const char *path)
     return error;
 }
 
-int ring_file_remove_stale(const char *path)
-{
-    int lock;
-    int error = ring_file_begin_naming(path, &lock);
-    if (!error) {
-        error = ring_file_remove_unlocked(path);
-        ring_file_end_naming(path, lock);
-    }
-    return error;
-}
-
 int ring_file_name(int fd, const char *path)
 {
     char unnamed[64];

@@ -68,7 +68,4 @@ int ring_file_name(int fd, const char *path);
 /* Removes the name if it is this file's. */
 void ring_file_unname(int fd, const char *path);
 
-/* Removes the ring of this path if its writer is dead. RING_MISSING, RING_BUSY, RING_LAYOUT, RING_ACCESS, SYSTEM. */
-int ring_file_remove_stale(const char *path);
-
 #endif

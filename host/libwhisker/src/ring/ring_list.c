@@ -174,10 +174,3 @@ int whisker_ring_list(struct whisker_ring_entry *entries, size_t room)
     }
     return count;
 }
-
-int whisker_ring_remove_stale(const char *name)
-{
-    char path[RING_PATH_BYTES];
-    const int error = ring_path(name, RING_PLACE_SHARED, path);
-    return error ? error : ring_file_remove_stale(path);
-}
