@@ -124,7 +124,7 @@ complete -c whisker -n '__fish_seen_subcommand_from stream' -l help -d 'show thi
 complete -c whisker -n '__fish_seen_subcommand_from stream' -l ring -d 'the ring to read (default: whisker)' -x
 complete -c whisker -n '__fish_seen_subcommand_from stream' -l ring-owner -d 'accept a ring of this user, too, not only root'\''s, your own and the service'\''s' -x
 complete -c whisker -n '__fish_seen_subcommand_from stream' -l wait -d 'wait so long for the ring to come up (0)' -x
-complete -c whisker -n '__fish_seen_subcommand_from stream' -l lanes -d 'such as 0,2,5-7 (default: the lane mask); 28 to 55: of the second bridge' -x
+complete -c whisker -n '__fish_seen_subcommand_from stream' -l lanes -d 'such as 0,2,5-7 (default: the lane mask)' -x
 complete -c whisker -n '__fish_seen_subcommand_from stream' -l every -d 'print one frame in N, those whose tick is a multiple of N (not filtered: what is faster folds down)' -x
 complete -c whisker -n '__fish_seen_subcommand_from stream' -l frames -d 'stop after so many' -x
 complete -c whisker -n '__fish_seen_subcommand_from stream' -l backlog -d 'begin with the oldest frame the ring holds, not the next'

@@ -2,8 +2,6 @@
 complete -c whiskerd -l ring -d 'name of the ring; readers attach to it' -x
 complete -c whiskerd -l ring-frames -d 'its capacity, a power of two (8192)' -x
 complete -c whiskerd -l serial -d 'the bridge with this serial number (the first that can be opened)' -x
-complete -c whiskerd -l second -d 'a second bridge, of this serial number (with --serial): its ticks begin with the first one'\''s tick_out, or with --tick-in both take the same source; its lanes are 28 to 55' -x
-complete -c whiskerd -l second-lane-mask -d 'bit n set: lane n of the second bridge is in use (0xfffffff)' -x
 complete -c whiskerd -l wait -d 'wait for a bridge instead of failing when there is none'
 complete -c whiskerd -l once -d 'end when the bridge goes, instead of waiting for it'
 complete -c whiskerd -l replace -d 'stop the whiskerd that has this ring, if it is yours, root'\''s or the service'\''s, and take over'
