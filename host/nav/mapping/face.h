@@ -6,22 +6,18 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "closure.h"
 #include "joint.h"
 #include "touches.h"
 
 enum { NAV_FACE_CELLS = 128 };
 
 struct nav_face {
-    long number;               /* of its own, as long as it is there */
     int index;                 /* of its direction in the joint; the offset is the next */
     double anchor_x, anchor_y; /* m */
     double low, high;          /* m along it from the anchor, to the left as one looks along the normal: felt */
     uint64_t felt[NAV_FACE_CELLS / 64]; /* a bit for each 5 cm of it that was felt, the anchor in the middle */
     double hits, missed;                /* contacts; whiskers that went through it */
     bool right;                         /* at right angles with the axes */
-    struct nav_stretch stretch;         /* of the contacts with it */
-    double felt_at;                     /* m along it, where it was felt last */
 };
 
 /* A point with a whisker's direction, as seen from a face. */

@@ -15,30 +15,10 @@ static const double CORNER_M = 0.03, PLACE_MOST = 0.3; /* m from a face's end; m
 
 void nav_faces_begin(struct nav_faces *f)
 {
-    f->row = 0;
-    f->way = 0.0;
-    f->made = 0;
-    f->corners.count = 0;
     f->count = 0;
     f->loose = 0;
     f->right = 1.0;
     f->refused = 1.0;
-}
-
-void nav_faces_meet(struct nav_faces *f, const struct nav_face *g, const struct nav_joint *j)
-{
-    for (int n = 0; n < f->count; n++) {
-        if (&f->face[n] != g)
-            nav_corners_feel(&f->corners, g, &f->face[n], j);
-    }
-}
-
-void nav_faces_feel(struct nav_faces *f, struct nav_face *g, const struct nav_joint *j, const struct nav_feel *feel)
-{
-    struct nav_sighting now = {f->row, f->way, feel->x, feel->y};
-    nav_stretch_feel(&g->stretch, now, feel->known, feel->probability, feel->contacts);
-    g->felt_at = feel->along;
-    nav_faces_meet(f, g, j);
 }
 
 double nav_faces_fresh(const struct nav_contact *c)
@@ -81,20 +61,16 @@ static void faces_apply_normal(struct nav_face *g, struct nav_joint *j, const st
         nav_joint_measure(j, &form, -off, noise);
 }
 
-static void faces_apply(struct nav_faces *f, struct nav_face *g, struct nav_joint *j, const struct nav_touch *t,
-                        double sigma, double total)
+static void faces_apply(struct nav_face *g, struct nav_joint *j, const struct nav_touch *t, double sigma)
 {
     struct nav_face_view view;
     if (!nav_face_look(g, j, t, &view))
         return;
-    double known = sqrt(fmax(view.variance, 0.0)), noise = nav_face_noise(&view, sigma);
-    double probability = nav_face_likelihood(g, &view, noise) / total;
-    nav_joint_measure(j, &view.form, -view.off, noise);
+    nav_joint_measure(j, &view.form, -view.off, nav_face_noise(&view, sigma));
     faces_apply_normal(g, j, t);
     nav_face_feel(g, view.along, view.along);
     g->hits += 1.0;
     g->missed = fmax(g->missed - 1.0, 0.0);
-    nav_faces_feel(f, g, j, &(struct nav_feel){t->x, t->y, view.along, known, probability, 1.0});
 }
 
 double nav_faces_take(struct nav_faces *f, struct nav_joint *j, const struct nav_touches *touches,
@@ -105,7 +81,7 @@ double nav_faces_take(struct nav_faces *f, struct nav_joint *j, const struct nav
     f->loose &= ~(1ULL << contact->place);
     int chosen = faces_choose(f, j, t, contact->sigma, nav_faces_fresh(contact), SHARP_M, &total);
     if (chosen >= 0) {
-        faces_apply(f, &f->face[chosen], j, t, contact->sigma, total);
+        faces_apply(&f->face[chosen], j, t, contact->sigma);
         return log(total * contact->length);
     }
     f->loose |= 1ULL << contact->place;
@@ -162,7 +138,7 @@ double nav_faces_drain(struct nav_faces *f, struct nav_joint *j, const struct na
         int chosen = faces_choose(f, j, t, sigma, nav_faces_fresh(contact), all ? (double)INFINITY : SHARP_M, &total);
         if (chosen < 0)
             continue;
-        faces_apply(f, &f->face[chosen], j, t, sigma, total);
+        faces_apply(&f->face[chosen], j, t, sigma);
         f->loose &= ~(1ULL << place);
         sum += log(total * contact->length / NAV_FACES_LOOSE);
     }

@@ -2,7 +2,7 @@
 #ifndef NAV_FACES_H
 #define NAV_FACES_H
 
-#include "corner.h"
+#include "face.h"
 
 enum { NAV_FACES_MOST = 64 };
 
@@ -11,10 +11,6 @@ struct nav_faces {
     struct nav_face face[NAV_FACES_MOST];
     uint64_t loose;        /* a bit for each touch that belongs to no face yet */
     double right, refused; /* faces at right angles and others, as counted, the prior's included */
-    long row;              /* that is being taken */
-    double way;            /* m that the robot has gone */
-    long made;             /* faces so far */
-    struct nav_corners corners;
 };
 
 /* A contact as a whisker reports it. */
@@ -49,21 +45,6 @@ double nav_faces_apart(const struct nav_faces *, const struct nav_joint *, const
  * this adds. */
 double nav_faces_drain(struct nav_faces *, struct nav_joint *, const struct nav_touches *, uint64_t among,
                        const struct nav_contact *, bool all);
-
-/* One or more contacts with a face. */
-struct nav_feel {
-    double x, y;        /* m, robot's frame */
-    double along;       /* m along the face */
-    double known;       /* m: how uncertain its distance was before */
-    double probability; /* of this face, against all others */
-    double contacts;    /* that it is worth */
-};
-
-/* Notes that the corners of a face were felt, where their other faces were shortly before. */
-void nav_faces_meet(struct nav_faces *, const struct nav_face *, const struct nav_joint *);
-
-/* Notes that a face was felt, and its corners, after the joint was corrected by it. */
-void nav_faces_feel(struct nav_faces *, struct nav_face *, const struct nav_joint *, const struct nav_feel *);
 
 /* Makes one face of two that are the same, and removes those that whiskers went through. */
 void nav_faces_review(struct nav_faces *, struct nav_joint *);

@@ -141,7 +141,6 @@ void nav_floor_forget(struct nav_floor *f)
 {
     memset(f->tile, 0, (size_t)NAV_FLOOR_SIDE * NAV_FLOOR_SIDE * (size_t)f->classes * sizeof *f->tile);
     f->agreement = 0.0;
-    f->begun++;
 }
 
 /* A floor that keeps being otherwise is learned anew. */
@@ -154,42 +153,11 @@ static double floor_agree(struct nav_floor *f, double log_likelihood)
     return log_likelihood;
 }
 
-static double floor_spread(const struct floor_view *v, const struct nav_joint *j)
-{
-    return sqrt(nav_joint_variance(j, &v->form) + BLUR_M * BLUR_M);
-}
-
-double nav_floor_at(const struct nav_floor *f, const struct nav_joint *j, double x, double y, int *column, int *row)
-{
-    struct floor_view v;
-    floor_look(f, j, x, y, &v);
-    *column = v.column;
-    *row = v.row;
-    return 1.0 - floor_beyond(v.off / floor_spread(&v, j));
-}
-
-void nav_floor_spread(const struct nav_floor *f, const struct nav_joint *j, double x, double y, double out[3])
+void nav_floor_at(const struct nav_floor *f, const struct nav_joint *j, double x, double y, int *column, int *row)
 {
     struct floor_place p = floor_place(f, j->mean, x, y);
-    struct nav_linear form[2], both;
-    for (int axis = 0; axis < 2; axis++)
-        form[axis] = floor_form(&p, axis, round(p.tile[axis]), 1.0);
-    both = nav_linear_sum(&form[0], &form[1]);
-    out[0] = nav_joint_variance(j, &form[0]);
-    out[2] = nav_joint_variance(j, &form[1]);
-    out[1] = 0.5 * (nav_joint_variance(j, &both) - out[0] - out[2]);
-}
-
-void nav_floor_middle(const struct nav_floor *f, const struct nav_joint *j, int column, int row, double *x, double *y)
-{
-    const double *m = j->mean;
-    double u = m[NAV_JOINT_LATTICE_U] + (column + 0.5) * m[NAV_JOINT_PITCH];
-    double v = m[NAV_JOINT_LATTICE_V] + (row + 0.5) * m[NAV_JOINT_PITCH];
-    double nx = cos(m[NAV_JOINT_LATTICE_TURN]), ny = sin(m[NAV_JOINT_LATTICE_TURN]);
-    double dx = f->x + nx * u - ny * v - m[NAV_JOINT_X], dy = f->y + ny * u + nx * v - m[NAV_JOINT_Y];
-    double c = cos(m[NAV_JOINT_HEADING]), s = sin(m[NAV_JOINT_HEADING]);
-    *x = c * dx + s * dy;
-    *y = c * dy - s * dx;
+    *column = (int)floor(p.tile[0]);
+    *row = (int)floor(p.tile[1]);
 }
 
 /* The window is of the tip's own tile with the probability that the tip is on this side; the moments of the Gaussian

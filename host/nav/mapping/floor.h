@@ -13,7 +13,6 @@ enum { NAV_FLOOR_SIDE = 48 }; /* tiles each way, its middle at the lattice's ref
 struct nav_floor {
     bool known; /* the lattice */
     int classes;
-    int begun;        /* how often its tiles were begun anew */
     double x, y;      /* reference of the lattice */
     double evidence;  /* log-likelihood of all windows by tiles */
     double agreement; /* of late windows, a running mean of the same, nats */
@@ -29,14 +28,8 @@ void nav_floor_copy(struct nav_floor *to, const struct nav_floor *from);
  * joint at borders. Returns the window's log-likelihood, 0 without a lattice. */
 double nav_floor_take(struct nav_floor *, struct nav_joint *, double x, double y, const float *ratio);
 
-/* The tile under the tip at (x, y) of the robot. Returns the probability that it is this one, not the nearest other. */
-double nav_floor_at(const struct nav_floor *, const struct nav_joint *, double x, double y, int *column, int *row);
-
-/* Covariance of that tip's place in the lattice, m^2: along its first axis, of both, along its second. */
-void nav_floor_spread(const struct nav_floor *, const struct nav_joint *, double x, double y, double out[3]);
-
-/* The middle of a tile in the robot's frame. */
-void nav_floor_middle(const struct nav_floor *, const struct nav_joint *, int column, int row, double *x, double *y);
+/* The tile under the tip at (x, y) of the robot. */
+void nav_floor_at(const struct nav_floor *, const struct nav_joint *, double x, double y, int *column, int *row);
 
 /* Takes over a lattice, whose tiles are not known. right: it stands along the world's right angles. */
 void nav_floor_adopt(struct nav_floor *, struct nav_joint *, const struct nav_lattice *, bool right);

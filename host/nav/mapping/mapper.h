@@ -84,27 +84,6 @@ struct nav_mapper_lattice nav_mapper_lattice(const struct nav_mapper *);
 /* Probability of a tile's likeliest texture, and which it is; 0: nothing was read there. */
 double nav_mapper_tile(const struct nav_mapper *, int column, int row, int *texture);
 
-/* What a loop was closed by. */
-enum {
-    NAV_MAPPER_LOOP_FACE,   /* a face that is touched */
-    NAV_MAPPER_LOOP_CORNER, /* a corner, both of whose faces are */
-    NAV_MAPPER_LOOP_TEXTURE /* a sequence of tiles of the floor, of which the last one is given */
-};
-
-/* A loop that closed: at row `to` the robot met, at (x, y) of its frame, the thing that it had met last at row `from`,
- * at (from_x, from_y) of its frame then: the point that a whisker touched, a corner, or a tile's middle. In between it
- * had gone a metre or more and become uncertain of the thing's place. */
-struct nav_mapper_loop {
-    long from, to;
-    double from_x, from_y, x, y; /* m */
-    double probability;          /* that it is one thing: above 0.98 */
-    int part;                    /* in whose frame the pose was */
-    int kind;                    /* NAV_MAPPER_LOOP_ and so on */
-};
-
-/* Loops so far, in order, the last 4096 at most: the first `room` go to `out`. Returns how many there are. */
-long nav_mapper_loops(const struct nav_mapper *, struct nav_mapper_loop *out, long room);
-
 /* A part of the run between two kidnaps: the robot was carried off before row `first`, which was noticed at row
  * `noticed`. Its poses are in a frame of its own, whose origin is the first of them, until it was joined at row
  * `joined` (-1: not yet) with part `into`, in whose frame that origin is at `place`. A part that is noticed and joined

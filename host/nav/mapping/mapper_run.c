@@ -4,7 +4,6 @@
 
 #include "gaussian.h"
 #include "kidnap.h"
-#include "loops.h"
 
 static const double SCALE_LEAST = 0.3, SCALE_MOST = 1.5; /* of the odometry's noise */
 static const double BEHIND = 30.0;                       /* nats at which a particle is given up */
@@ -39,8 +38,7 @@ static int mapper_init(struct nav_mapper *m)
         failed |= nav_particle_map_init(&m->particle[n], problem->arena.classes);
         m->particle[n].scale = mapper_scale(n, m->options.particles);
     }
-    m->loop = calloc(NAV_MAPPER_LOOPS, sizeof *m->loop);
-    return m->particle && m->loop ? failed : -1;
+    return m->particle ? failed : -1;
 }
 
 struct nav_mapper *nav_mapper_new(const struct nav_problem *problem, const struct nav_mapper_options *options)
@@ -67,7 +65,6 @@ void nav_mapper_free(struct nav_mapper *m)
     for (int n = 0; m->particle && n < m->options.particles; n++)
         nav_particle_map_free(&m->particle[n]);
     free(m->particle);
-    free(m->loop);
     nav_kept_free(&m->challenger);
     nav_course_free(&m->course);
     nav_lattice_search_free(&m->search);
@@ -178,29 +175,6 @@ static void mapper_answer(const struct nav_mapper *m, struct nav_estimate *out)
                  nav_record_bytes(&m->record) + nav_kidnap_bytes(&m->record);
 }
 
-static void mapper_note(struct nav_mapper *m, const struct nav_closure *c)
-{
-    m->loop[m->loops++ % NAV_MAPPER_LOOPS] = (struct nav_mapper_loop){.from = c->then.row,
-                                                                      .to = c->now.row,
-                                                                      .from_x = c->then.x,
-                                                                      .from_y = c->then.y,
-                                                                      .x = c->now.x,
-                                                                      .y = c->now.y,
-                                                                      .probability = 1.0 - c->doubt,
-                                                                      .part = m->course.part,
-                                                                      .kind = (int)c->kind};
-}
-
-/* Notes the loops that were closed by a row. */
-static void mapper_close(struct nav_mapper *m, long row)
-{
-    struct nav_closure closure[NAV_LOOPS_MOST];
-    struct nav_loops loops = {m->particle, m->options.particles, nav_mapper_best(m), row};
-    int count = nav_loops_close(&loops, &m->course.sequence, closure);
-    for (int n = 0; n < count; n++)
-        mapper_note(m, &closure[n]);
-}
-
 void nav_mapper_step(struct nav_mapper *m, const struct nav_row *row, struct nav_estimate *out)
 {
     struct nav_record_row taken = nav_record_at(&m->record, nav_record_take(&m->record, row));
@@ -209,7 +183,6 @@ void nav_mapper_step(struct nav_mapper *m, const struct nav_row *row, struct nav
     for (int n = 0; n < m->options.particles; n++)
         nav_particle_map_take(&m->particle[n], &m->record, &taken, n < SCALES ? NULL : &m->rng);
     nav_course_follow(&m->course, nav_mapper_best(m), &m->record, &taken);
-    mapper_close(m, taken.number);
     best = nav_mapper_best(m);
     floor = best->floor.known ? best->floor.evidence - floor : 0.0;
     nav_kidnap_take(m, &taken, best->evidence - evidence - floor, floor,

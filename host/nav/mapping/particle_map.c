@@ -79,8 +79,6 @@ void nav_particle_map_take(struct nav_particle_map *p, const struct nav_record *
     double scale = p->scale * p->scale;
     struct nav_noise noise = {scale * row->noise.position, scale * row->noise.heading};
     const struct nav_model *rays = nav_record_rays(r);
-    p->faces.row = row->number;
-    p->faces.way += hypot(row->step.x, row->step.y);
     nav_touches_move(&p->touches, row->step, noise);
     nav_joint_move(&p->joint, row->step, noise);
     p->evidence += nav_faces_stand(&p->faces, &p->joint, r->problem->robot.body_radius);

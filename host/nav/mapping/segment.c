@@ -18,7 +18,6 @@ struct segment_match {
 struct segment_choice {
     struct segment_match match[NAV_FACES_MOST + 1];
     double likelihood[NAV_FACES_MOST + 2];
-    double fresh; /* density of faces not in the map that they are weighed by, 1 / m */
     double total;
 };
 
@@ -73,7 +72,6 @@ static void segment_weigh(const struct nav_faces *f, const struct nav_joint *j, 
                           double fresh, struct segment_choice *c)
 {
     int count = f->count;
-    c->fresh = fresh;
     double right = f->right / (f->right + f->refused);
     for (int n = 0; n < count; n++) {
         segment_match_face(&f->face[n], j, line, &c->match[n]);
@@ -99,28 +97,19 @@ static int segment_choose(const struct segment_choice *c, int count, double chan
     return best;
 }
 
-/* Probability of the chosen face, for a closure: faces not in the map are as dense as contacts with them are. */
-static double segment_probability(const struct nav_faces *f, const struct segment_choice *c, int chosen, double fresh)
-{
-    double added = (fresh / c->fresh - 1.0) * (c->likelihood[f->count] + c->likelihood[f->count + 1]);
-    return c->likelihood[chosen] / (c->total + added);
-}
-
 static double segment_hits(const struct nav_touches_line *line)
 {
     return fmin(nav_touches_count(line->used), SEGMENT_HITS);
 }
 
-static void segment_of_face(struct nav_faces *f, struct nav_face *g, struct nav_joint *j,
-                            const struct nav_touches_line *line, const struct segment_match *m, double probability)
+static void segment_of_face(struct nav_face *g, struct nav_joint *j, const struct nav_touches_line *line,
+                            const struct segment_match *m)
 {
-    double known = sqrt(fmax(nav_joint_variance(j, &m->place), 0.0));
     nav_joint_measure(j, &m->place, -m->off, line->offset_var + NAV_FACE_ROUGH_M * NAV_FACE_ROUGH_M);
     double turn = nav_wrap(j->mean[NAV_JOINT_HEADING] + line->normal - j->mean[g->index]);
     nav_joint_measure(j, &m->angle, -turn, line->normal_var);
     nav_face_feel(g, m->along - line->span / 2.0, m->along + line->span / 2.0);
     g->hits += segment_hits(line);
-    nav_faces_feel(f, g, j, &(struct nav_feel){line->x, line->y, m->along, known, probability, segment_hits(line)});
 }
 
 static void segment_to_axes(const struct nav_face *g, struct nav_joint *j)
@@ -146,15 +135,12 @@ static void segment_add(struct nav_faces *f, struct nav_joint *j, const struct n
     struct nav_face *g = &f->face[f->count++];
     *g = (struct nav_face){.anchor_x = m[NAV_JOINT_X] + lx, .anchor_y = m[NAV_JOINT_Y] + ly, .right = right};
     g->hits = segment_hits(line);
-    g->number = f->made++;
-    nav_stretch_begin(&g->stretch, (struct nav_sighting){f->row, f->way, line->x, line->y}, segment_hits(line));
     g->index = nav_joint_add(j, normal, &direction, line->normal_var);
     (void)nav_joint_add(j, 0.0, &offset, line->offset_var + NAV_FACE_ROUGH_M * NAV_FACE_ROUGH_M);
     nav_face_feel(g, -line->span / 2.0, line->span / 2.0);
     *(right ? &f->right : &f->refused) += 1.0;
     if (right)
         segment_to_axes(g, j);
-    nav_faces_meet(f, g, j);
 }
 
 /* Log-likelihood of the segment's contacts, over all of them as of no face. Two of them fix the line, or one and its
@@ -174,8 +160,7 @@ static double segment_place(struct nav_faces *f, struct nav_joint *j, const stru
     struct segment_choice choice;
     int count = f->count;
     bool single = nav_touches_count(line->used) == 1;
-    double fresh = nav_faces_fresh(contact);
-    segment_weigh(f, j, line, single ? fresh : NAV_FACE_NEW_PER_M, &choice);
+    segment_weigh(f, j, line, single ? nav_faces_fresh(contact) : NAV_FACE_NEW_PER_M, &choice);
     double score = segment_score(line, choice.total, contact->length);
     if (score < (single ? 0.0 : 2.0 * log(nav_touches_count(f->loose))))
         return 0.0;
@@ -184,8 +169,7 @@ static double segment_place(struct nav_faces *f, struct nav_joint *j, const stru
         return nav_faces_drain(f, j, touches, line->used, contact, true);
     f->loose &= ~line->used;
     if (chosen < count)
-        segment_of_face(f, &f->face[chosen], j, line, &choice.match[chosen],
-                        segment_probability(f, &choice, chosen, fresh));
+        segment_of_face(&f->face[chosen], j, line, &choice.match[chosen]);
     else if (count < NAV_FACES_MOST)
         segment_add(f, j, line, chosen == count);
     return score;

@@ -20,7 +20,7 @@ from crunchbot.nav.scoring import position_errors
 from crunchbot.scene import Scene, load
 from crunchbot.tables import TableError, unwritable
 
-from ..scenes import benchmark, map_events, map_scoring, own_map, write_scene
+from ..scenes import benchmark, map_scoring, own_map, write_scene
 from ..scenes.making import make
 from ..scenes.map_reading import read_map_folder
 
@@ -242,7 +242,7 @@ def _map_scores(arguments: argparse.Namespace, scene: Scene, rows: Observations)
         return found | {f"odometry_{key}": value for key, value in beside.items()}
     robot, textures = replace(scene.robot, sensors=()), scene.arena.textures
     mapped = mapping.run(robot, textures, rows, particles=arguments.particles, quiet=arguments.json)
-    found = map_scoring.score(mapped, scene.arena) | map_events.closures_score(mapped, scene.arena)
+    found = map_scoring.score(mapped, scene.arena)
     found |= {"parts": float(len(mapped.parts)), "parts_joined": float(sum(p.joined is not None for p in mapped.parts))}
     return found | (_own(mapped, arguments) if arguments.own else {})
 

@@ -32,7 +32,7 @@ STYLES = {
 LEGEND = """<ul class="keys" id="motion-textures"><li><i class="mark line"></i>pose, and where it was</li>
 <li><i class="mark dashes"></i>robot as it really went</li><li><i class="mark block"></i>obstacle</li>
 <li><i class="mark face"></i>face that was felt, ± 2 σ</li><li><i class="mark ring"></i>corner, 2 σ</li>
-<li><i class="mark loop"></i>loop that closed</li><li><i class="mark free"></i>free</li><li><i class="mark solid"></i>solid</li></ul>"""
+<li><i class="mark free"></i>free</li><li><i class="mark solid"></i>solid</li></ul>"""
 
 
 @dataclass(frozen=True)
@@ -209,14 +209,13 @@ def brought(parts: dict, motion: Motion) -> dict:
 
     faces = [[*point(f[0], f[1]), *point(f[2], f[3]), round(f[4] + motion.turn, 4), *f[5:]] for f in parts["faces"]]
     corners = [[*point(c[0], c[1]), c[2]] for c in parts["corners"]]
-    loops = [[*p[:2], *point(p[2], p[3]), *point(p[4], p[5]), *p[6:]] for p in parts["loops"]]
     lattice, grid = parts["lattice"], parts["grid"]
     if lattice:
         lattice = [*point(*lattice[:2]), round(lattice[2] + motion.turn, 4), lattice[3]]
     if grid:
         x, y = point(grid["x"], grid["y"])
         grid = grid | {"x": x, "y": y, "turn": round(grid["turn"] + motion.turn, 4)}
-    return parts | {"faces": faces, "corners": corners, "loops": loops, "lattice": lattice, "grid": grid}
+    return parts | {"faces": faces, "corners": corners, "lattice": lattice, "grid": grid}
 
 
 def _error_figure(run: MapRun, which: str) -> str:

@@ -31,7 +31,7 @@ def figure() -> Figure:
         _draw(ax, arena, mapper.map(), first)
         ax.plot(*truth[:rows:EVERY, :2].T, color="0.55", linestyle=":", linewidth=0.6)
         ax.plot(*first.points(path[::EVERY, :2]).T, color="black", linewidth=0.5)
-        ax.set_title(f"after {rows * ROW_S:.0f} s: {len(mapper.map().loops)} loops", fontsize=9)
+        ax.set_title(f"after {rows * ROW_S:.0f} s", fontsize=9)
     drawn.axes[0].set_ylabel("m", fontsize=8)
     return drawn
 

@@ -13,7 +13,7 @@ import matplotlib
 import numpy as np
 
 from crunchbot.nav import mapping
-from crunchbot.nav.mapper import LOOP_KINDS, default_particles
+from crunchbot.nav.mapper import default_particles
 from crunchbot_lab.scenes import map_events, map_scoring, own_map
 from crunchbot_lab.scenes.families import NORMAL_SD_DEG
 from crunchbot_lab.scenes.making import ROW_S, make
@@ -60,19 +60,6 @@ COLUMNS = (  # title, key, factor, digits
     ("right, %", "tiles_right", 100, 1),
     ("us a row", "step_us_mean", 1, 0),
 )
-EVENTS = (
-    ("loops closed", "closures", 1, 0),
-    ("of one line of faces, %", "closures_right", 100, 1),
-    ("of one face, %", "closures_same", 100, 1),
-    ("meetings closed, %", "closures_recall", 100, 0),
-    ("us a row, 99 %", "step_us_p99", 1, 0),
-)
-CLOSURES = (  # the same of every kind; the key has the kind before it, but for faces
-    ("a run", "closures", 1, 0),
-    ("right, %", "closures_right", 100, 1),
-    ("false as they say, %", "closures_stated_false", 100, 1),
-    ("meetings closed, %", "closures_recall", 100, 0),
-)
 SLOWER, WORSE = (
     1.5,
     1.3,
@@ -90,8 +77,7 @@ def one(family: str, seed: int, rows: int = ROWS, own: bool = False, **options) 
     mapped = mapping.run(scene.robot, scene.arena.textures, made.observations, seed, **options)
     if made.kidnaps:
         return map_events.kidnaps_score(mapped, made.kidnaps)
-    found = map_scoring.score(mapped, scene.arena) | map_events.closures_score(mapped, scene.arena)
-    found |= map_events.kidnaps_score(mapped, ())
+    found = map_scoring.score(mapped, scene.arena) | map_events.kidnaps_score(mapped, ())
     return found | (own_figures(own_map.score(mapped, family, seed)[0]) if own else {})
 
 
@@ -226,32 +212,8 @@ def event_rows(found: dict[str, dict]) -> list[list[str]]:
     """A row of the page a family."""
     out = []
     for family, one_family in found.items():
-        cells = [_cell(one_family[key], factor, digits) for _, key, factor, digits in EVENTS]
-        out.append([family, *cells, f"{one_family['alarms']:.0f}"])
+        out.append([family, _cell(one_family["step_us_p99"], 1, 0), f"{one_family['alarms']:.0f}"])
     return out
-
-
-def closure_rows(found: dict[str, dict]) -> list[list[str]]:
-    """A row of the page a family and kind; none of a family that was measured before kinds were."""
-    out = []
-    for family, one_family in found.items():
-        for kind in LOOP_KINDS:
-            before = "" if kind == "face" else f"{kind}_"
-            if f"{before}closures_stated_false" in one_family:
-                cells = [_cell(one_family[before + key], factor, digits) for _, key, factor, digits in CLOSURES]
-                out.append([family, kind, *cells])
-    return out
-
-
-def _closures(found: dict[str, dict]) -> str:
-    rows = closure_rows(found)
-    if not rows:
-        return ""
-    return (
-        "\nBy kind: a corner, both of whose faces are touched again; a texture, a sequence of tiles read again. False as "
-        "they say: the mean of the probabilities that they are. [What is behind it](../formats.md#loops-that-close).\n\n"
-        + table(["family", "kind", *(title for title, *_ in CLOSURES)], rows)
-    )
 
 
 def kidnap_rows(found: dict[str, dict]) -> list[list[str]]:
@@ -282,10 +244,8 @@ def page(data: dict) -> str:
         "robot does not know.\n\n"
         "## No gyroscope\n\n"
         + families
-        + "\nLoops: a face touched again after a metre or more without it. Right: both touches are of one line of faces; a "
-        "meeting is closed when a right loop comes within 3 s.\n\n"
-        + table(["family", *(title for title, *_ in EVENTS), "kidnaps that were none"], event_rows(data["families"]))
-        + _closures(data["families"])
+        + "\n"
+        + table(["family", "us a row, 99 %", "kidnaps that were none"], event_rows(data["families"]))
         + f"\n## With normals of the faces that are touched, to {NORMAL_SD_DEG:g} degrees\n\n"
         + normals
         + "\n## With a gyroscope of 0.2 degrees a row\n\n"

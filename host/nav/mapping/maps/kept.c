@@ -6,7 +6,6 @@ int nav_course_init(struct nav_course *t, const struct nav_problem *problem)
 {
     int failed = nav_trail_init(&t->trail, &problem->arena, &problem->robot);
     failed |= nav_cells_init(&t->cells);
-    failed |= nav_sequence_init(&t->sequence, problem->arena.classes);
     return failed ? -1 : 0;
 }
 
@@ -14,14 +13,12 @@ void nav_course_free(struct nav_course *t)
 {
     nav_trail_free(&t->trail);
     nav_cells_free(&t->cells);
-    nav_sequence_free(&t->sequence);
 }
 
 void nav_course_begin(struct nav_course *t, long row)
 {
     nav_trail_clear(&t->trail);
     nav_cells_clear(&t->cells);
-    nav_sequence_clear(&t->sequence);
     t->begun = t->row = row;
     t->entered = (struct nav_pose){0.0, 0.0, 0.0};
     t->patches = 0.0;
@@ -36,7 +33,6 @@ void nav_course_follow(struct nav_course *t, const struct nav_particle_map *map,
     double variance = (cov[NAV_JOINT_X] + cov[NAV_JOINT_Y * (map->joint.room + 1)]) / 2.0;
     bool any = false;
     nav_cells_take(&t->cells, r, row, pose, sqrt(fmax(variance, 0.0)));
-    nav_sequence_take(&t->sequence, map, r, row);
     nav_trail_move(&t->trail, row->step);
     for (int tip = 0; tip < r->tips; tip++) {
         const float *window = row->window + (ptrdiff_t)tip * (1 + r->classes);
@@ -79,7 +75,6 @@ void nav_kept_copy(struct nav_kept *k, const struct nav_particle_map *map, const
     nav_particle_map_copy(&k->map, map);
     nav_trail_copy(&to->trail, &course->trail);
     nav_cells_copy(&to->cells, &course->cells);
-    nav_sequence_copy(&to->sequence, &course->sequence);
     to->begun = course->begun;
     to->row = course->row;
     to->entered = course->entered;
@@ -104,7 +99,6 @@ void nav_kept_enter(struct nav_kept *k, long begun, struct nav_pose pose, double
     k->map.touches.held = 0;
     k->map.faces.loose = 0;
     k->map.evidence = 0.0;
-    nav_sequence_end(&k->course.sequence);
     k->course.patches = nav_trail_patches(&k->course.trail, true);
     k->course.begun = k->course.row = begun;
     k->course.entered = pose;

@@ -4,14 +4,12 @@
 
 #include "cells.h"
 #include "particle_map.h"
-#include "sequence.h"
 #include "trail.h"
 
 /* What was read and felt along a path, which may have been entered anew somewhere: the robot was carried. */
 struct nav_course {
     struct nav_trail trail;
     struct nav_cells cells;
-    struct nav_sequence sequence;
     long begun, row;         /* the first row of its last part; the first that it has not taken */
     struct nav_pose entered; /* where the last part begins */
     double patches;          /* log-likelihood of windows by patches before that */

@@ -435,6 +435,6 @@ size_t nav_kidnap_bytes(const struct nav_record *r)
 {
     size_t trail = NAV_TRAIL_MOST * ((size_t)r->classes + 6) * sizeof(float);
     size_t cells = (size_t)NAV_CELLS_SIDE * NAV_CELLS_SIDE * sizeof(float);
-    size_t kept = nav_particle_map_bytes(r->classes) + trail + cells + nav_sequence_bytes(r->classes);
+    size_t kept = nav_particle_map_bytes(r->classes) + trail + cells;
     return (NAV_MAPPER_KEPT + 7) * kept;
 }

@@ -10,7 +10,6 @@ enum {
     NAV_MAPPER_KEPT = 3,
     NAV_MAPPER_AGAIN = 2000, /* rows taken again at once, at most */
     NAV_MAPPER_PARTS = 64,
-    NAV_MAPPER_LOOPS = 4096,
     NAV_MAPPER_DOUBTS = 64
 };
 
@@ -64,8 +63,6 @@ struct nav_mapper {
     struct nav_lattice_search search;
     int sought; /* borders when a lattice was sought last */
     struct nav_kidnaps kidnaps;
-    struct nav_mapper_loop *loop; /* [LOOPS], the oldest in the place of the next */
-    long loops;
     struct nav_rng rng;
 };
 

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "corner.h"
 #include "mapper_state.h"
 
 static const double DEEP_M = 0.05, BLUR_M = 0.01; /* of what is solid behind a face; of its surface */
@@ -199,12 +200,4 @@ long nav_mapper_parts(const struct nav_mapper *m, struct nav_mapper_part *out, l
 int nav_mapper_frame(const struct nav_mapper *m)
 {
     return m->course.part;
-}
-
-long nav_mapper_loops(const struct nav_mapper *m, struct nav_mapper_loop *out, long room)
-{
-    long count = m->loops < NAV_MAPPER_LOOPS ? m->loops : NAV_MAPPER_LOOPS;
-    for (long n = 0; n < room && n < count; n++)
-        out[n] = m->loop[(m->loops - count + n) % NAV_MAPPER_LOOPS];
-    return count;
 }

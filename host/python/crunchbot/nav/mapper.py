@@ -20,17 +20,9 @@ FACE = np.dtype(
     + [("face", "i4"), ("right", "i4")]
 )
 CORNER = np.dtype([(name, "f8") for name in ("x", "y", "xx", "xy", "yy")] + [("face", "i4", 2)])
-LOOP = np.dtype(
-    [(name, "i8") for name in ("from", "to")]
-    + [(name, "f8") for name in ("from_x", "from_y", "x", "y", "probability")]
-    + [("part", "i4"), ("kind", "i4")]
-)
-LOOP_KINDS = ("face", "corner", "texture")  # as enum in host/nav/mapping/mapper.h counts them
-LOOPS = ffi.typeof("struct nav_mapper_loop[]")
 FACES, CORNERS = ffi.typeof("struct nav_mapper_face[]"), ffi.typeof("struct nav_mapper_corner[]")
 assert FACE.itemsize == ffi.sizeof("struct nav_mapper_face")
 assert CORNER.itemsize == ffi.sizeof("struct nav_mapper_corner")
-assert LOOP.itemsize == ffi.sizeof("struct nav_mapper_loop")
 SEED_MOST = 2**64 - 1
 PARTICLES_MOST = 5000
 PATCH_M = 0.3
@@ -85,8 +77,7 @@ class TouchMap:
     """What is believed of the world. `faces`: (n,) of FACE, stretches that were felt; `axes`: direction of their right
     angles, rad, None: not known; `lattice`: None where the evidence is for none. `tiles`: (column, row) of the lattice to
     (index of its likeliest texture, probability). `corners`: (n,) of CORNER, where faces meet, m, with covariance, m^2.
-    `loops`: (n,) of LOOP, those that closed so far, the last 4096 at most: at row `to` the robot met, at (x, y) m of its
-    frame, a thing that it had met last at row `from`; `kind`: index of LOOP_KINDS; `probability`: that it is one thing. `frame`: number of the part of the run (Mapper.parts)
+    `frame`: number of the part of the run (Mapper.parts)
     whose first pose is the origin.
     """
 
@@ -96,7 +87,6 @@ class TouchMap:
     tiles: dict[tuple[int, int], tuple[int, float]]
     corners: np.ndarray = field(default_factory=lambda: np.zeros(0, CORNER))
     grid: Grid | None = None
-    loops: np.ndarray = field(default_factory=lambda: np.zeros(0, LOOP))
     frame: int = 0
 
 
@@ -144,11 +134,10 @@ class Mapper:
     def map(self) -> TouchMap:
         """The map after the last row: cheap enough for once a second."""
         corners = self._listed(lib.nav_mapper_corners, CORNERS, CORNER, "corners")
-        loops = self._listed(lib.nav_mapper_loops, LOOPS, LOOP, "loops")
         axes, lattice = lib.nav_mapper_lattice(self._mapper).axes, self.lattice()
         tiles = dict(self._tiles()) if lattice else {}
         known = None if axes != axes else float(axes)
-        return TouchMap(self.faces(), known, lattice, tiles, corners, self._grid(), loops, self.frame)
+        return TouchMap(self.faces(), known, lattice, tiles, corners, self._grid(), self.frame)
 
     def parts(self) -> list[Part]:
         """What the run fell into so far; one part where the robot was never carried off."""

@@ -13,11 +13,11 @@ from ..scene import OBSERVATIONS, Arena, Prior, Robot, Scene, load_robot, write
 from ..tables import TableError, read_rows, unwritable
 from .filters import ESTIMATE
 from .map_scene import CELL_M, MapScene, map_scene
-from .mapper import LOOP_KINDS, PATCH_M, Mapper, Part, TouchMap
+from .mapper import PATCH_M, Mapper, Part, TouchMap
 from .observations import Observations, read_observations
 
 CHUNK = 100  # rows between two steps of the progress bar
-FACES, TILES, CORNERS, CLOSURES, PARTS = "faces.csv", "tiles.csv", "corners.csv", "closures.csv", "parts.csv"
+FACES, TILES, CORNERS, PARTS = "faces.csv", "tiles.csv", "corners.csv", "parts.csv"
 ESTIMATES, IMAGE, MAP, CELLS = "est.csv", "map.png", "map.yaml", "occupancy.npy"
 START_SIGMA = (0.02, 0.02, 0.03)  # of the first pose in prior.toml: m, m, rad
 GREYS = {FREE: 254, SOLID: 0}  # of ROS; any other cell is 205
@@ -126,7 +126,7 @@ def _joined(table: np.ndarray, parts: tuple[Part, ...]) -> np.ndarray:
 
 
 def write_map(folder: str | Path, mapped: Mapped) -> MapScene:
-    """Write arena.toml, robot.toml, prior.toml, tables of faces, corners, tiles, closures, parts and estimates, map.png,
+    """Write arena.toml, robot.toml, prior.toml, tables of faces, corners, tiles, parts and estimates, map.png,
     map.yaml and occupancy.npy; TableError when it cannot be."""
     folder, made = Path(folder), mapped.scene()
     start = from_map(np.zeros((1, 3)), made.origin)[0]
@@ -159,7 +159,7 @@ def _write_tables(folder: Path, mapped: Mapped, made: MapScene) -> None:
         spread = (cov[0, 0], cov[0, 1], cov[1, 1])
         poses.append(",".join([t_s, *(f"{v:.6f}" for v in numbers), *(f"{v:.4g}" for v in spread), str(part)]))
     named = ((FACES, faces), (TILES, tiles), (ESTIMATES, poses), (CORNERS, _corners(touched, made.origin)))
-    for name, lines in (*named, (CLOSURES, _closures(mapped)), (PARTS, _parts(mapped))):
+    for name, lines in (*named, (PARTS, _parts(mapped))):
         (folder / name).write_text("\n".join(lines) + "\n")
 
 
@@ -170,16 +170,6 @@ def _corners(touched: TouchMap, origin: Pose) -> list[str]:
         x, y, _ = from_map(np.array([[corner["x"], corner["y"], 0.0]]), origin)[0]
         cov = back @ np.array([[corner["xx"], corner["xy"]], [corner["xy"], corner["yy"]]]) @ back.T
         lines.append(f"{x:.6f},{y:.6f},{cov[0, 0]:.4g},{cov[0, 1]:.4g},{cov[1, 1]:.4g}")
-    return lines
-
-
-def _closures(mapped: Mapped) -> list[str]:
-    """Loops that closed; times are those of the rows."""
-    lines, t_text = ["kind,t_s,from_t_s,x_m,y_m,from_x_m,from_y_m,probability"], mapped.rows.t_text
-    for loop in mapped.touched.loops:
-        places = (loop["x"], loop["y"], loop["from_x"], loop["from_y"])
-        cells = [LOOP_KINDS[loop["kind"]], t_text[loop["to"]], t_text[loop["from"]], *(f"{v:.4f}" for v in places)]
-        lines.append(",".join([*cells, f"{loop['probability']:.6f}"]))
     return lines
 
 
@@ -219,7 +209,6 @@ def summary(mapped: Mapped, made: MapScene) -> dict:
         "step_us_mean": round(float(us.mean()), 1),
         "step_us_p99": round(float(np.quantile(us, 0.99)), 1),
         "peak_bytes": int(mapped.table["bytes"].max()) if len(mapped.table) else 0,
-        "loops": len(touched.loops),
         "parts": len(mapped.parts),
         "joined": sum(part.joined is not None for part in mapped.parts),
         "bad_cells": mapped.bad_cells,

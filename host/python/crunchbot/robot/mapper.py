@@ -25,7 +25,6 @@ from .network.health import ENDED, RUNNING, Health
 from .network.inbox import Received
 from .network.link import Link
 from .network.messages import Header, Localisation, Observation, PoseWithCovariance, PoseWithCovarianceStamped
-from .network.ranges import LOOPS_MOST
 from .network.ros import MAP_FRAME, MapMetaData, OccupancyGrid, Pose
 from .network.row_checks import RowChecks
 from .network.rows import Follower, Step
@@ -181,9 +180,7 @@ class MapperProcess:
         self._touched = self._mapper.map()
         if self._touched.grid is not None and self._touched.grid.occupied.size:
             self._grids.send(to_grid(header, self._touched))
-        t_s = np.concatenate([rows.t_s for rows in self._rows])
-        loops = placed(self._touched.loops, t_s, np.concatenate(self._tables)["pose"])
-        self._maps.send(to_message(header, self._seq, self._scene.arena.textures, self._touched, loops))
+        self._maps.send(to_message(header, self._seq, self._scene.arena.textures, self._touched))
         now = time.monotonic()
         self._map_s = now + (now - began) / MAP_SHARE
 
@@ -221,11 +218,8 @@ def to_grid(header: Header, touched: TouchMap) -> OccupancyGrid:
     return OccupancyGrid(header, info, per_cent.ravel())
 
 
-def to_message(
-    header: Header, seq: int, textures: tuple[str, ...], touched: TouchMap, loops: np.ndarray
-) -> messages.TouchMap:
-    """The map after row `seq`, without the occupancy; loops (n, 8): time, time before, x, y, x and y before, probability,
-    kind."""
+def to_message(header: Header, seq: int, textures: tuple[str, ...], touched: TouchMap) -> messages.TouchMap:
+    """The map after row `seq`, without the occupancy."""
     found, faces, corners = touched.lattice, touched.faces, touched.corners
     tiles = np.array([(*tile, *said) for tile, said in sorted(touched.tiles.items())]).reshape(-1, 4)
     stretches = (faces[name] for name in ("x0", "y0", "x1", "y1", "normal", "normal_sigma", "offset_sigma"))
@@ -241,16 +235,4 @@ def to_message(
         corners["x"],
         corners["y"],
         corner_sd,
-        *loops.T,
     )
-
-
-def placed(loops: np.ndarray, t_s: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """(n, 8) of the newest LOOPS_MOST loops, as `to_message` has them: of rows at t_s (m,) with poses (m, 3)."""
-    newest = loops[-LOOPS_MOST:]
-    now, then = poses[newest["to"]], poses[newest["from"]]
-    out = [t_s[newest["to"]], t_s[newest["from"]]]
-    for pose, x, y in ((now, newest["x"], newest["y"]), (then, newest["from_x"], newest["from_y"])):
-        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-        out += [pose[:, 0] + c * x - s * y, pose[:, 1] + s * x + c * y]
-    return np.column_stack([*out, newest["probability"], newest["kind"]])

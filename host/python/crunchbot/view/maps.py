@@ -8,7 +8,7 @@ import numpy as np
 
 NAME_MOST = 40  # characters of a texture's name
 FREE_BELOW, NO_CELL = 20, 255  # per cent; a byte
-GROUPS = {"tiles": "tile_", "faces": "face_", "corners": "corner_", "loops": "loop_"}  # of the sequences of a TouchMap
+GROUPS = {"tiles": "tile_", "faces": "face_", "corners": "corner_"}  # of the sequences of a TouchMap
 
 
 def map_parts(touched: Any, grid: Any) -> dict:

@@ -56,8 +56,6 @@ def examples() -> dict[str, object]:
             rng.random(3).astype("f4"),
             *(rng.random(4).astype("f4") for _ in range(7)),
             *(rng.random(2).astype("f4") for _ in range(3)),
-            *(rng.random(3).astype("f4") for _ in range(7)),
-            np.array([0, 1, 2], "u1"),
         ),
         "truth": m.PoseStamped(at, m.Pose.planar(0.5, 0.25, -1.0)),
         "health/pilot": m.ProcessHealth(at, "pilot", 4321, "running", [m.KeyValue("rows", "7")], "none yet"),

@@ -380,14 +380,14 @@ def test_a_mappers_map_is_shown_and_the_truth_in_its_frame():
     info = MapMetaData(0.03125, 3, 2, Pose.planar(-0.5, 0.25, 0.0))
     model.take("map", OccupancyGrid(Header.at(ROW_NS), info, np.array([-1, 0, 50, 99, 100, 1], "i1")))
     tiles = [(-1, 1, 0, 0.5), (0, -2, 1, 0.9), (2, 3, 1, 1.0)]
-    model.take("touch_map", touch_map(tiles, [[0.5] * 7] * 4, [[0.25] * 3] * 2, [[*[0.75] * 7, 2]]))
+    model.take("touch_map", touch_map(tiles, [[0.5] * 7] * 4, [[0.25] * 3] * 2))
     reported = json.loads(feed.take())
     assert reported["topic"] == "map" and feed.take() is None
     shown = reported["map"]
     assert shown["textures"] == ["VINYL", "ROUGH"] and shown["lattice"][3] > 0.0
     assert [tile[:3] for tile in shown["tiles"]] == [[-1, 1, 0], [0, -2, 1], [2, 3, 1]]
     assert len(shown["faces"]) == 4 and len(shown["faces"][0]) == 7 and len(shown["corners"][0]) == 3
-    assert shown["loops"] == [[*[0.75] * 7, 2]] and shown["part"] == 0
+    assert shown["part"] == 0
     grid = shown["grid"]
     assert list(base64.b64decode(grid["cells"])) == [255, 0, 50, 99, 100, 1]
     assert (grid["columns"], grid["rows"], grid["x"], grid["y"]) == (3, 2, -0.5, 0.25)

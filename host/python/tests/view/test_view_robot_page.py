@@ -330,22 +330,15 @@ def test_a_map_takes_the_arenas_place_with_what_was_felt():
             await b.until("robotPart.drawn && robotPart.scene")
             assert await b.eval("$('map-card').hidden") and await b.text("#plan-title") == "Arena from above"
             post.put("map", OccupancyGrid(Header.at(0), info, cells.ravel()))
-            loop = (12.0, 4.0, 0.2, 0.5, 0.2, -0.25, 1.0, 1)
-            post.put("touch_map", touch_map(tiles=[(0, 0, 1, 0.95), (1, 0, 0, 0.5)], faces=[face], loops=[loop]))
+            post.put("touch_map", touch_map(tiles=[(0, 0, 1, 0.95), (1, 0, 0, 0.5)], faces=[face]))
             said = await b.until("!$('map-card').hidden && $('map').innerText")
             assert "1 stretches of faces" in said and "2 felt, 1 sure" in said and "2.0 m² free" in said
-            assert (
-                "1 (0 faces, 1 corners, 0 textures), the last at 12.0 s with a corner met 8.0 s before" in said
-                and "the first" in said
-            )
+            assert "the first" in said
             assert await b.text("#plan-title") == "Map from above" and await b.eval("$('obstacle-legend').hidden")
             assert await b.eval("robotPart.plan.bounds") == [-1.0, -1.0, 2.0, 1.0]
-            good, bad = await colour(b, "--good"), await colour(b, "--bad")
+            good = await colour(b, "--good")
             assert await b.eval(place(FLOOR_SEEN, 0.25, 0.0, good)) and not await b.eval(
                 place(FLOOR_SEEN, 0.6, 0.0, good)
-            )
-            assert await b.eval(place(FLOOR_SEEN, 0.2, 0.5, bad)) and not await b.eval(
-                place(FLOOR_SEEN, -0.5, 0.5, bad)
             )
 
     asyncio.run(scenario())

@@ -199,9 +199,9 @@ class Clock:
         return self.now
 
 
-def touch_map(tiles=(), faces=(), corners=(), loops=(), seq: int = 11) -> m.TouchMap:
+def touch_map(tiles=(), faces=(), corners=(), seq: int = 11) -> m.TouchMap:
     """A mapper's map of these things, each a row of its group's fields, in their order."""
-    groups = [np.array(rows, float).reshape(-1, n).T for rows, n in ((tiles, 4), (faces, 7), (corners, 3), (loops, 8))]
+    groups = [np.array(rows, float).reshape(-1, n).T for rows, n in ((tiles, 4), (faces, 7), (corners, 3))]
     columns = [column for group in groups for column in group]
     return m.TouchMap(m.Header.at(ROW_NS), seq, 0, ["VINYL", "ROUGH"], np.array([0.0, 0.1, 0.2, 0.5]), *columns)
 

@@ -129,14 +129,6 @@ class TouchMap:
     corner_x: np.ndarray
     corner_y: np.ndarray
     corner_sd: np.ndarray
-    loop_s: np.ndarray
-    loop_from_s: np.ndarray
-    loop_x: np.ndarray
-    loop_y: np.ndarray
-    loop_from_x: np.ndarray
-    loop_from_y: np.ndarray
-    loop_probability: np.ndarray
-    loop_kind: np.ndarray
 
 
 @dataclass(eq=False)
@@ -260,7 +252,7 @@ def _check_grid(grid: OccupancyGrid) -> None:
         raise Malformed(f"field data: {len(grid.data)} cells, {grid.info.width} by {grid.info.height} belong")
 
 
-GROUPS = ("tile_column", "face_x0", "corner_x", "loop_s")  # the first of each group of sequences of a TouchMap
+GROUPS = ("tile_column", "face_x0", "corner_x")  # the first of each group of sequences of a TouchMap
 
 
 def _check_touch_map(touched: TouchMap) -> None:

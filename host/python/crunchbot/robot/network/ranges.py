@@ -19,8 +19,7 @@ CELLS_MOST = 512  # of a row: whiskers times textures
 COUNTERS_MOST = 256
 COMPONENTS_MOST = 2000  # of a Belief
 GRID_MOST = 1_100_000  # cells of an occupancy grid: the mapper's reach, at its cells, squared, with room to spare
-TILES_MOST, FACES_MOST, CORNERS_MOST, LOOPS_MOST = 4096, 1024, 2048, 256  # of a TouchMap
-KIND_MOST = 2  # of a loop: face, corner, texture
+TILES_MOST, FACES_MOST, CORNERS_MOST = 4096, 1024, 2048  # of a TouchMap
 SHARE_MOST = 1.01  # of a share of a belief, with room for rounding
 
 
@@ -145,10 +144,6 @@ _TABLE = {
         "face_offset_sd": up_to(FAR_M, count=FACES_MOST),
         **dict.fromkeys(("corner_x", "corner_y"), about(FAR_M, count=CORNERS_MOST)),
         "corner_sd": up_to(FAR_M, count=CORNERS_MOST),
-        **dict.fromkeys(("loop_s", "loop_from_s"), up_to(1e9, count=LOOPS_MOST)),
-        **dict.fromkeys(("loop_x", "loop_y", "loop_from_x", "loop_from_y"), about(FAR_M, count=LOOPS_MOST)),
-        "loop_probability": up_to(SHARE_MOST, count=LOOPS_MOST),
-        "loop_kind": up_to(KIND_MOST, count=LOOPS_MOST),
     },
     "whisker_msgs/msg/ProcessHealth": {
         "header": INNER,

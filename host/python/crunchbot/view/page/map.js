@@ -5,18 +5,12 @@ const BAND_LEAST = 1.5; // px, half of the band about a face
 const FACE_LEAST = 6; // px, of a stretch that was felt at one point
 const STEP_FIT_M = 0.5; // of what the plan shows, so that it seldom moves
 const NO_CELL = 255;
-const LOOPS_STRONG = 6; // the newest; older ones are as faint as
-const LOOP_FAINT = 0.25;
-const LOOP_KINDS = ['face', 'corner', 'texture'];
-const LOOP_FACE = 0;
-const LOOP_MARKS = [null, [[-1, -1], [1, -1], [1, 1], [-1, 1]], [[0, -1.4], [1.4, 0], [0, 1.4], [-1.4, 0]]]; // of corners and textures
 
 class MapLayer {
   constructor(plan) { this.plan = plan; }
 
   /* { textures, lattice: [x, y, turn, pitch] or null, tiles: [column, row, texture, probability], faces: [x0, y0, x1, y1, normal, its sd,
-   * offset's sd], corners: [x, y, sd], loops: [t, t then, x, y, x then, y then,
-   * probability, kind], grid: { x, y, turn, cell, columns, rows, cells: base64 of bytes, per cent or NO_CELL } or null }. */
+   * offset's sd], corners: [x, y, sd], grid: { x, y, turn, cell, columns, rows, cells: base64 of bytes, per cent or NO_CELL } or null }. */
   draw(pen, map) {
     this.pen = pen;
     if (map.grid) this.occupancy(map.grid);
@@ -25,34 +19,6 @@ class MapLayer {
     for (const face of faces) this.band(face);
     for (const face of faces) this.line(face);
     for (const corner of map.corners) this.corner(corner);
-    map.loops.forEach((loop, n) => this.loop(loop, map.loops.length - 1 - n));
-  }
-
-  /* Where a thing was met again: a line from where it had been met, fainter for those before; a dot for a face, a square for a corner, a rhomb for
-   * tiles. */
-  loop([, , x, y, fromX, fromY, , kind], before) {
-    const { plan, pen } = this;
-    pen.globalAlpha = Math.max(LOOP_FAINT, 1 - before / LOOPS_STRONG);
-    pen.strokeStyle = pen.fillStyle = plan.css('--bad');
-    pen.lineWidth = 1.6 * plan.ratio;
-    pen.setLineDash([3 * plan.ratio, 3 * plan.ratio]);
-    pen.beginPath();
-    pen.moveTo(plan.x(fromX), plan.y(fromY));
-    pen.lineTo(plan.x(x), plan.y(y));
-    pen.stroke();
-    pen.setLineDash([]);
-    this.loopMark(plan.x(x), plan.y(y), (before ? 3 : 5) * plan.ratio, kind);
-    if (before) pen.stroke();
-    else pen.fill();
-    pen.globalAlpha = 1;
-  }
-
-  loopMark(x, y, half, kind) {
-    const { pen } = this;
-    pen.beginPath();
-    if (kind === LOOP_FACE) pen.arc(x, y, half, 0, 2 * Math.PI);
-    else for (let n = 0; n < 4; n += 1) pen.lineTo(x + half * LOOP_MARKS[kind][n][0], y + half * LOOP_MARKS[kind][n][1]);
-    pen.closePath();
   }
 
   occupancy({ x, y, turn, cell, columns, rows, cells }) {
@@ -158,8 +124,5 @@ function mapSaid(map) {
   const faces = map.faces.length ? `${map.faces.length} stretches of faces, half of them to ± ${signed(1000 * off[Math.floor(off.length / 2)], 0)} mm` : 'no face yet';
   const tiles = map.lattice ? `tiles of ${signed(map.lattice[3], 3)} m, ${map.tiles.length} felt, ${sure} sure` : 'no tiles found in the floor';
   const area = map.grid ? `${signed(map.grid.free_m2, 1)} m² free` : 'nothing known to be free';
-  const last = map.loops.at(-1);
-  const counts = LOOP_KINDS.map((kind, n) => `${map.loops.filter((loop) => loop[7] === n).length} ${kind}s`).join(', ');
-  const loops = last ? `${map.loops.length} (${counts}), the last at ${signed(last[0], 1)} s with a ${LOOP_KINDS[last[7]]} met ${duration(last[0] - last[1])} before` : 'none closed yet';
-  return { faces, tiles, area, loops, corners: `${map.corners.length}` };
+  return { faces, tiles, area, corners: `${map.corners.length}` };
 }

@@ -35,8 +35,8 @@ function tellPose(word, belief) {
 }
 
 function tellMap(map) {
-  const { faces, tiles, area, corners, loops } = mapSaid(map);
-  pairsOf($('map'), [['Faces', faces], ['Corners', corners], ['Loops', loops], ['Floor', tiles], ['Ground', area], ['As of row', count(map.seq)], ['Part of the run', map.part ? `${map.part + 1}, after ${map.part === 1 ? 'a kidnap' : `${map.part} kidnaps`}` : 'the first']]);
+  const { faces, tiles, area, corners } = mapSaid(map);
+  pairsOf($('map'), [['Faces', faces], ['Corners', corners], ['Floor', tiles], ['Ground', area], ['As of row', count(map.seq)], ['Part of the run', map.part ? `${map.part + 1}, after ${map.part === 1 ? 'a kidnap' : `${map.part} kidnaps`}` : 'the first']]);
 }
 
 function tellBehaviour(word) {
