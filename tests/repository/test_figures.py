@@ -1,7 +1,7 @@
 """Measured figures that stand in pages which people write: they equal bench/results, and so each other.
 
-A figure that a page takes from a measurement has an entry here. What `tools/benches page` writes is compared as a whole
-(tests/repository/test_benches.py), and so are the generated sections of other pages (below).
+A figure that a page takes from a measurement has an entry here. The tables that `tools/benches page` writes are compared
+as a whole.
 """
 
 import json
@@ -43,18 +43,6 @@ def damaged(reader: str) -> Callable[[dict], tuple[str, ...]]:
     return of
 
 
-def restarts(case: str) -> Callable[[dict], tuple[str, ...]]:
-    def of(data: dict) -> tuple[str, ...]:
-        cells = []
-        for start in ("checkpoint", "uniform"):
-            found = data["cases"][f"{case}, {start}"]
-            cells += [f"{100 * found[key]:.0f} %" for key in ("near at once", "near again within 60 s")]
-            cells.append(", ".join(f"{seconds:.1f}" for seconds in found["again_s"]))
-        return tuple(cells)
-
-    return of
-
-
 def drill_errors(data: dict) -> tuple[str, ...]:
     (run,) = data["runs"]
     failed = sum(bool(event["failures"]) for event in run["events"])
@@ -63,7 +51,6 @@ def drill_errors(data: dict) -> tuple[str, ...]:
     return *faults, f"{run['error_p50_m']:.3f}", f"{run['error_p90_m']:.3f}", share
 
 
-CELLS = r" \| ([^|]+) \| ([^|]+) \| ([^|]+) \| ([^|]+) \| ([^|]+) \| ([^|]+) \|\n"
 FIGURES = (
     Figure(
         "README.md",
@@ -82,12 +69,6 @@ FIGURES = (
     Figure("docs/using.md", r"by the index \| (\d+) % \| (\d+) \|", "damage", damaged("mcap, indexed")),
     Figure("docs/using.md", r"rosbags [\d.]+ \| (\d+) % \| (\d+) \|", "damage", damaged("rosbags")),
     Figure("docs/using.md", r"Of (\d+) damaged files", "damage", lambda d: (str(d["files"]),)),
-    Figure(
-        "docs/view.md",
-        r"(\d+) % of a core for one page.*?(\d+) kB/s",
-        "view",
-        lambda d: (f"{100 * d['runs'][1]['cpu_share']:.0f}", f"{d['runs'][1]['bytes_per_s_page'] / 1000:.0f}"),
-    ),
     Figure(
         "tests/drills/README.md",
         r"(\d+)\s+faults, (\d+) with failures.*?median\s+([\d.]+) m, p90\s+([\d.]+) m,\s+([\d.]+) %",
@@ -117,16 +98,6 @@ FIGURES = (
             for at, digits in ((-1, 1), (0, 0))
         ),
     ),
-    *(
-        Figure("tests/drills/README.md", rf"\| {title}{CELLS}", "restart", restarts(case))
-        for title, case in (
-            ("0 s", "gap 0 s"),
-            ("1 s", "gap 1 s"),
-            ("5 s", "gap 5 s"),
-            ("1 s, the pilot dead too[^|]*", "pilot too"),
-            ("1 s, the robot carried[^|]*", "carried"),
-        )
-    ),
 )
 
 
@@ -140,18 +111,14 @@ def test_a_figure_of_a_page_is_that_of_the_result(figure):
     assert groups == figure.expected(result(figure.result))
 
 
-@pytest.mark.parametrize("room", ["bench", "timing"])
-def test_a_generated_section_of_a_page_is_what_its_bench_makes_of_the_result(room, monkeypatch):
+def test_the_tables_of_pages_are_what_the_stored_results_give(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "tools"))
-    from benches.bridge import bench, timing
-    from benches.markdown import wrap
+    from benches import tables
 
-    page, module, made = {
-        "bench": ("boards", bench, lambda: bench.section(result("bridge"))),
-        "timing": ("timing", timing, lambda: timing.table(result("bridge_timing"))),
-    }[room]
-    stands = (ROOT / f"docs/{page}.md").read_text().split(module.BEGIN)[1].split(module.END)[0]
-    assert stands.strip() == wrap(made()).strip()
+    assert len(tables.pages()) > 15
+    for path in tables.pages():
+        text = path.read_text()
+        assert tables.written(text) == text, f"{path}: run '.venv/bin/python tools/benches page'"
 
 
 def test_no_page_says_how_fast_the_chain_runs_but_the_generated_ones():

@@ -19,11 +19,12 @@ from types import ModuleType
 import matplotlib
 
 ROOT = Path(__file__).resolve().parents[2]
-TOPICS = {  # topic -> module, by room; the page is last, for it shows what the others have measured
+TOPICS = {  # topic -> module, by room; the page is last, for its tables show what the others have measured
     "bridge": "bridge.bench",
     "chain": "bridge.chain",
     "contact": "contact.bench",
     "damage": "host.damage",
+    "floors": "nav.floors",
     "host": "host.bench",
     "image": "node.image",
     "levels": "bridge.levels",
@@ -36,16 +37,12 @@ TOPICS = {  # topic -> module, by room; the page is last, for it shows what the 
     "node": "node.bench",
     "radial": "radial.bench",
     "record": "host.record",
-    "restart": "robot.restart",
     "ring": "host.ring",
     "robot": "robot.bench",
     "texture": "texture.bench",
     "timing": "bridge.timing",
-    "touch": "nav.touch",
     "usb": "bridge.usb",
-    "view": "host.view",
-    "pace": "bridge.pace",
-    "page": "pages",
+    "page": "tables",
 }
 # Options of the topics whose full size takes more than some minutes, as `make bench` gives them.
 ROUND = {

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from . import store
-from .headlines import HEADLINES
+from .front.tables import HEADLINES
 
 FRONT = Path(__file__).resolve().parent
 FRESH = "--fresh"

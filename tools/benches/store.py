@@ -17,8 +17,6 @@ from matplotlib.figure import Figure
 
 from crunchbot_lab.report.origin import WRITTEN, commit, machine
 
-from .markdown import wrap
-
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS, CHARTS = ROOT / "bench/results", ROOT / "docs/charts"
 ORIGINS = "origins.json"  # in the folder of the results: file -> commit and machine
@@ -26,53 +24,29 @@ BENCH = ROOT / "build/bench"  # peers' programs and environments, and by the sta
 
 # Command -> results in bench/results, charts in docs/charts.
 MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "tools/benches bridge": (("bridge",), ("bridge_lanes",)),
-    "tools/benches chain": (
-        ("chain_speed", "demo", "localisation"),
-        ("chain_speed", "demo_arena", "demo_errors", "demo_radial", "demo_texture", "localisation"),
-    ),
-    "tools/benches contact": (("contact",), ("contact_errors",)),
+    "tools/benches bridge": (("bridge",), ()),
+    "tools/benches chain": (("chain_speed", "demo"), ("demo_arena", "demo_errors", "demo_radial", "demo_texture")),
+    "tools/benches contact": (("contact",), ()),
     "tools/benches damage": (("damage",), ()),
-    "tools/benches host": (("host",), ("host_cable", "host_clock")),
+    "tools/benches floors": (("floors",), ()),
+    "tools/benches host": (("host",), ()),
     "tools/benches image": (("node_image",), ()),
-    "tools/benches levels": (("levels", "levels_shares"), ("levels_shares", "levels_speed")),
-    "tools/benches map": (("map",), ("map", "map_growing")),
-    "tools/benches map_peers": (("map_peers",), ("map_peers",)),
-    "tools/benches mechanics": (
-        ("mechanics", "mechanics_edges"),
-        ("mechanics_edges", "mechanics_moment", "mechanics_speed"),
-    ),
-    "tools/benches nav": (
-        (
-            *("nav_pareto", "nav_cost", "nav_tracking", "nav_locks", "nav_budgets", "nav_balance", "nav_variation"),
-            *("nav_matrix", "nav_soak", "nav_passes"),
-        ),
-        (
-            *("nav_confidence", "nav_cost", "nav_honesty", "nav_locks", "nav_matrix", "nav_pareto", "nav_regions"),
-            "nav_variation",
-        ),
-    ),
+    "tools/benches levels": (("levels",), ()),
+    "tools/benches map": (("map",), ()),
+    "tools/benches map_peers": (("map_peers",), ()),
+    "tools/benches mechanics": (("mechanics",), ()),
+    "tools/benches nav": (("nav_matrix", "nav_pareto"), ("nav_pareto",)),
     "tools/benches nav_peers": (("nav_peers",), ()),
     "tools/benches nav_unseen": (("nav_unseen",), ()),
-    "tools/benches nav_unseen --leave": (("nav_left_out",), ()),
-    "tools/benches node": (("node", "node_cuts", "node_faults"), ("node_age", "node_link", "node_skew")),
-    "tools/benches pace": (("pace",), ()),
-    "tools/benches radial": (("radial",), ("radial_cost", "radial_fig5")),
-    "tools/benches radial --whisker3d DIR": (("radial_real",), ()),
-    "tools/benches record": (("record",), ("record_cost",)),
-    "tools/benches restart": (("restart",), ()),
-    "tools/benches ring": (("ring",), ("ring_latency", "ring_throughput", "ring_writer")),
-    "tools/benches robot": (
-        ("robot_instructions", "robot_latency", "robot_levels", "robot_long", "robot_odometry"),
-        ("robot_latency", "robot_level_pairs", "robot_levels", "robot_long", "robot_odometry"),
-    ),
-    "tools/benches texture": (("texture",), ("texture_cost", "texture_course", "texture_time")),
+    "tools/benches node": (("node", "node_cuts", "node_faults"), ()),
+    "tools/benches radial": (("radial",), ("radial_fig5",)),
+    "tools/benches record": (("record",), ()),
+    "tools/benches ring": (("ring",), ()),
+    "tools/benches robot": (("robot_levels", "robot_long"), ("robot_long",)),
+    "tools/benches texture": (("texture",), ()),
     "tools/benches timing": (("bridge_timing",), ()),
-    "tools/benches touch": (("touch",), ("touch",)),
-    "tools/benches usb": (("usb_soak",), ("usb_soak",)),
-    "tools/benches view": (("view",), ("view_cost",)),
+    "tools/benches usb": (("usb_soak",), ()),
     "tools/fuzz.py": (("fuzz",), ()),
-    "no command: builds of their own": (("nav_ablations", "nav_designs"), ()),
     "make mutants": (("mutants",), ()),
     "python -m drills": (("drills",), ()),
 }
@@ -80,6 +54,7 @@ COMMAND_OF_RESULT = {name: command for command, (results, _) in MAKES.items() fo
 COMMAND_OF_CHART = {name: command for command, (_, charts) in MAKES.items() for name in charts}
 
 
+WIDTH = 400  # of a line of a result, at most, where it has parts
 ERROR, LINKER = re.compile(r"\berror\b|cannot find|not found", re.IGNORECASE), re.compile(r"\bld: ")
 WROTE: list[str] = []  # results of this process
 LEFT_OUT: dict[str, str] = {}  # peers and parts of this process that could not be measured, each with its own error
@@ -139,10 +114,23 @@ def read_result(name: str):
     return json.loads((RESULTS / f"{name}.json").read_text())
 
 
+def text_of(value, indent: str = "") -> str:
+    """JSON; what fits in a line stays in one."""
+    short = json.dumps(value)
+    if len(indent) + len(short) <= WIDTH or not isinstance(value, (dict, list)):
+        return short
+    inner = f"{indent} "
+    if isinstance(value, list):
+        parts, ends = [text_of(part, inner) for part in value], "[]"
+    else:
+        parts, ends = [f"{json.dumps(str(key))}: {text_of(part, inner)}" for key, part in value.items()], "{}"
+    return ends[0] + ",".join(f"\n{inner}{part}" for part in parts) + f"\n{indent}{ends[1]}"
+
+
 def write_result(name: str, data, folder: Path = RESULTS) -> None:
     """The file of a result, and where it comes from."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{name}.json").write_text(json.dumps(data, indent=1) + "\n")
+    (folder / f"{name}.json").write_text(text_of(data) + "\n")
     record_origin(name, folder)
 
 
@@ -152,7 +140,7 @@ def record_origin(name: str, folder: Path = RESULTS) -> None:
     origins = json.loads(path.read_text()) if path.exists() else {}
     origins[name] = {"commit": commit(), "machine": machine()}
     WROTE.append(name)
-    path.write_text(json.dumps(dict(sorted(origins.items())), indent=1) + "\n")
+    path.write_text(text_of(dict(sorted(origins.items()))) + "\n")
 
 
 def adopt(names: list[str], folder: Path = RESULTS) -> None:
@@ -163,22 +151,16 @@ def adopt(names: list[str], folder: Path = RESULTS) -> None:
     if any(origins[name]["commit"] != now for name in names):
         for name in names:
             origins[name]["commit"] = now
-        path.write_text(json.dumps(origins, indent=1) + "\n")
+        path.write_text(text_of(origins) + "\n")
 
 
-def write_chart(name: str, drawn: Figure | str, folder: Path = CHARTS, *, letters: bool = False) -> None:
-    """A figure, or the text of one that is SVG already. letters: its words are written as text, not as outlines."""
+def write_chart(name: str, drawn: Figure | str, folder: Path = CHARTS) -> None:
+    """A figure, or the text of one that is SVG already."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.svg"
     if isinstance(drawn, str):
         path.write_text(drawn)
         return
     salt = matplotlib.rcParams["svg.hashsalt"] or "whisker"
-    with matplotlib.rc_context({"svg.hashsalt": salt} | ({"svg.fonttype": "none"} if letters else {})):
+    with matplotlib.rc_context({"svg.hashsalt": salt}):
         drawn.savefig(path, metadata={"Date": None})
-
-
-def write_page(path: Path, text: str) -> None:
-    """A page whose lines are short enough."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(wrap(text))

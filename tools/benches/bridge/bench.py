@@ -9,15 +9,12 @@ are nextpnr's own; the limits of the PHY's pins are those of fpga/boards/report.
 import json
 import subprocess
 import sys
-import textwrap
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from .. import store
-from ..markdown import wrap
 from .chain import LINKS
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -32,19 +29,11 @@ import report  # noqa: E402
 
 from whisker_protocol import FRAME_BYTES, LIMITS  # noqa: E402
 
-SWEPT = "colorlight_i9"  # the chart of resources over lanes
 COUNTS = (28, 12, 1, 14, 6)  # of lanes; what is asked for most often comes first
 PROCESSES = 2  # of place and route, each of one thread
 TRIES = 8  # seeds, as build.py tries them
 PACES = (4000, 2000, 1000, 600, 530, 522, 521, 520, 519, 518, 517, 516)  # cycles from tick to tick
 PACED_TICKS = 2000
-BEGIN, END = "<!-- tools/benches bridge writes from here -->", "<!-- to here -->"  # in docs/boards.md
-PLACED = (
-    "| board, lanes | seed | clock reached (goal: 60) | out | in | through | shortest in, at least "
-    "| LUT | FF | block RAM | distributed RAM | problem |"
-)
-WAYS, CELLS = ("out_ns", "in_ns", "through_ns"), ("LUT", "FF", "block RAM", "distributed RAM")
-MARKERS = "os^vD*P"
 
 
 def placed(name: str, lanes: int, seed: int) -> dict:
@@ -144,85 +133,6 @@ def measured(board: dict) -> list[dict]:
     return [run for run in board["runs"] if "seed" in run]
 
 
-def draw_lanes(found: dict) -> Figure:
-    """Resources of the swept board and every board's clock over lanes."""
-    figure = Figure(figsize=(7, 4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    points = measured(found["boards"][SWEPT])
-    counts = [point["lanes"] for point in points]
-    for (name, style), marker in zip((("LUT", "-"), ("FF", "--"), ("distributed RAM", ":")), "os^", strict=True):
-        left.plot(counts, [p["used"][name] for p in points], style, marker=marker, color="0.2", label=name)
-    left.set(xlabel="lanes", ylabel="cells (of 43 848 LUT)", ylim=(0, None), xticks=sorted(COUNTS))
-    left.legend(frameon=False)
-    for (_, board), marker in zip(sorted(found["boards"].items()), MARKERS, strict=False):
-        runs = measured(board)
-        label = f"{board['title']}, grade {board['speed']}"
-        right.plot([r["lanes"] for r in runs], [r["fmax_mhz"] for r in runs], f"{marker}-", color="0.3", label=label)
-    right.axhline(report.CLOCK_MHZ, color="0.5", linewidth=1, linestyle="--")
-    right.annotate(
-        f"{report.CLOCK_MHZ:g} MHz is the goal", (1, report.CLOCK_MHZ), xytext=(0, -12), textcoords="offset points"
-    )
-    right.set(xlabel="lanes", ylabel="clock, MHz (nextpnr)", ylim=(50, None), xticks=sorted(COUNTS))
-    boards = right.get_legend_handles_labels()
-    figure.legend(*boards, loc="outside lower right", ncols=3, frameon=False, fontsize=8)
-    return figure
-
-
-def rows(board: dict) -> list[str]:
-    """A board's lines in the table of docs/boards.md, one for each number of lanes that has been placed."""
-    lines = []
-    for run in measured(board):
-        name = f"{board['title']} ({board['part']}, grade {board['speed']}), {run['lanes']}"
-        ways = [f"{run[way]:.1f} of {board['limits'][way]:.1f} ns" if board["limits"] else "-" for way in WAYS]
-        least = board["least"].get("shortest_in_ns")
-        ways.append("-" if least is None else f"{run['shortest_in_ns']:.1f} of {least:.1f} ns")
-        used = [str(run["used"][cell]) for cell in CELLS]
-        clock = f"{run['fmax_mhz']:.1f} MHz: {100 * (run['fmax_mhz'] / report.CLOCK_MHZ - 1):.1f} % to spare"
-        problem = "; ".join(run["problems"]) or "none"
-        lines.append("| " + " | ".join([name, str(run["seed"]), clock, *ways, *used, problem]) + " |")
-    return lines
-
-
-def missing(found: dict) -> str:
-    """What has not been placed yet, in a sentence; empty if nothing."""
-    boards = {
-        board["title"]: ", ".join(str(run["lanes"]) for run in board["runs"] if "seed" not in run)
-        for board in found["boards"].values()
-    }
-    names = "; ".join(f"{title} with {lanes}" for title, lanes in boards.items() if lanes)
-    return f" Not placed yet: {names} lanes." if names else ""
-
-
-def table(head: str, rows: list[str]) -> str:
-    """A table in Markdown; `head`: its first line."""
-    return "\n".join([head, "|---" * (head.count("|") - 1) + "|", *rows])
-
-
-def section(found: dict) -> str:
-    """What docs/boards.md says of these figures."""
-    lines = [line for _, board in sorted(found["boards"].items()) for line in rows(board)]
-    return "\n\n".join(
-        (
-            textwrap.fill(
-                "The default command at every number of lanes. LUT counts nextpnr's cells, carry chains included."
-                + missing(found),
-                150,
-                break_on_hyphens=False,
-            ),
-            table(PLACED, lines),
-            "![Resources and clock over lanes](charts/bridge_lanes.svg)",
-        )
-    )
-
-
-def write_section(found: dict) -> None:
-    """Puts it between the marks in docs/boards.md."""
-    path = ROOT / "docs/boards.md"
-    before, rest = path.read_text().split(BEGIN)
-    after = rest.split(END)[1]
-    path.write_text(f"{before}{BEGIN}\n\n{wrap(section(found))}\n\n{END}{after}")
-
-
 def options(parser) -> None:
     parser.add_argument(
         "--placements", type=int, default=10**6, help="new placements at most (default: all that are missing)"
@@ -230,12 +140,10 @@ def options(parser) -> None:
 
 
 def run(build: Path, placements: int = 10**6) -> None:
-    """All figures of the bridge: bench/results/bridge.json, docs/charts/bridge_*, the table of docs/boards.md.
+    """All figures of the bridge.
 
     `build` runs the pace alone.
     """
     found = {"gateware": store.state(*GATEWARE)} | fabric(placements)
     found |= {"latency": {title: latency(link) for title, link in LINKS.items()}, "rates": rates(build)}
     store.write_result("bridge", found)
-    store.write_chart("bridge_lanes", draw_lanes(found))
-    write_section(found)

@@ -2,7 +2,7 @@
 
 Both run with the internal host of `whisker-bridge-sim --bench`, which checks every frame. Counted is processor time, in
 one thread, less that of a short run (start-up), so other programs on the machine matter little; on a free core it is
-the wall's. Where it goes, by part of the simulation: shares.py.
+the wall's.
 """
 
 import resource
@@ -10,12 +10,10 @@ import statistics
 import subprocess
 from pathlib import Path
 
-from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from .. import store
-from . import shares
-from .chain import LINKS, bridge_speed
+from .chain import LINKS
 
 LANES = (1, 6, 12, 28)
 FASTEST, HARDWARE = LINKS.values()
@@ -27,8 +25,6 @@ CASES = {
 }
 START_UP_S = 0.1  # simulated, of the short run
 REPEATS = 3
-TICKS_PER_S = 2000
-SHARED = {"rtl": "rtl, SCK/6, gap 0.5 us", "bytes": "bytes"}  # level -> its case in the chart of the parts
 
 
 def processor_s(command: list) -> float:
@@ -64,43 +60,6 @@ def measure(build: Path) -> dict:
     }
 
 
-def draw(found: dict) -> Figure:
-    figure = Figure(figsize=(7, 4), layout="constrained")
-    axes = figure.subplots()
-    for (case, points), style in zip(found.items(), ("^-", "o-", "s--"), strict=True):
-        axes.plot([p["lanes"] for p in points], [p["realtime_factor"] for p in points], style, label=case)
-    axes.axhline(1.0, color="0.3", linewidth=1)
-    axes.annotate("real time", (LANES[-1], 1.0), textcoords="offset points", xytext=(0, -14), ha="right", color="0.3")
-    axes.set(xlabel="populated lanes", ylabel="simulated seconds per processor second", yscale="log", xticks=LANES)
-    axes.legend(frameon=False, title="bridge and nodes, level")
-    return figure
-
-
-def measure_shares(build: Path, found: dict) -> dict:
-    """Processor time of a tick by part, at both levels, and the limits beside it."""
-    levels = {}
-    for level, case in SHARED.items():
-        levels[level] = [
-            {
-                "lanes": point["lanes"],
-                "realtime_factor": point["realtime_factor"],
-                "us_per_tick": 1e6 / (TICKS_PER_S * point["realtime_factor"]),
-                "shares": shares.shares([*bench_of(build, case, point["lanes"]), CASES[case][2]]),
-            }
-            for point in tqdm(found[case], desc=f"shares, {level}", unit="run")
-        ]
-    cycles = bridge_speed(build, LANES[0], FASTEST)["cycles_per_tick"]
-    return {"levels": levels, "cycles_per_tick": cycles, "limits": shares.limits(cycles)}
-
-
 def run(build: Path) -> None:
     """Two minutes in all: nothing is kept between runs."""
-    found = measure(build)
-    store.write_result("levels", found)
-    store.write_chart("levels_speed", draw(found))
-    try:
-        parts = measure_shares(build, found)
-    except RuntimeError as error:
-        return store.leave_out("shares of the parts", str(error))
-    store.write_result("levels_shares", parts)
-    store.write_chart("levels_shares", shares.draw(parts["levels"]))
+    store.write_result("levels", measure(build))

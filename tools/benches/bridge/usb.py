@@ -11,21 +11,11 @@ import subprocess
 import time
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from .. import store
 
-NAME = "usb_soak"  # of the results and the chart
+NAME = "usb_soak"
 TARGET = 10_000_000  # frames
 CHUNK = 25_000  # frames of one seed: some ten seconds
-DONE = {
-    "frames": "frames read",
-    "packets": "bulk packets read",
-    "noise": "packets of noise",
-    "wire_faults": "lost ACKs, damaged packets",
-    "restarts": "configured or halted anew",
-    "resets": "bus resets at any cycle",
-}
 BAD = ("gaps", "duplicates", "wrong", "stale", "answered", "unexplained", "hangs")  # all must be 0
 
 
@@ -53,25 +43,6 @@ def run(build: Path, frames: int = TARGET) -> None:
         if bad := {name: found[name] for name in BAD if found[name]}:
             raise SystemExit(f"seed {total['seeds']} is not clean: {bad}")
     store.write_result(NAME, total)
-    store.write_chart(NAME, draw(total))
-
-
-def draw(total: dict) -> Figure:
-    """What the device went through, and what came of it."""
-    figure = Figure(figsize=(8, 3.4), layout="constrained")
-    axes = figure.subplots()
-    counts = [total[name] for name in DONE]
-    axes.barh(list(DONE.values()), counts, color="0.6", edgecolor="0.2")
-    for row, count in enumerate(counts):
-        axes.text(count * 1.15, row, f"{count:,}".replace(",", " "), va="center", fontsize=9)
-    axes.set_xscale("log")
-    axes.set_xlim(1, 30 * max(counts))
-    axes.set_xlabel("count since the first seed (logarithmic)")
-    axes.invert_yaxis()
-    axes.spines[["top", "right"]].set_visible(False)
-    bad = ", ".join(f"{name} {total[name]}" for name in BAD)
-    axes.set_title(f"USB device at packet level, {total['seeds']} seeds\n{bad}", fontsize=10, loc="left")
-    return figure
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -1,23 +1,19 @@
 """The contact filter in simulated contacts of known truth: place, normal, contour, speed, honesty, cost.
 
-Writes bench/results/contact.json, docs/results/contact.md and docs/charts/contact_errors.
+Writes bench/results/contact.json.
 """
 
 import argparse
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from .. import store
 from .measure import CASES, FIRST_S, WHISKED, contacts, decided, follow, true_motion
-from .page import page
 from .scenes import TICK_S
 
-ROOT = Path(__file__).resolve().parents[3]
 CONTACTS = 20
-SLICES_S = np.arange(0.02, 0.36, 0.02)
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -89,42 +85,17 @@ def slip_figures(slip: np.ndarray, slides: np.ndarray) -> dict[str, float]:
     return {"sticks": float(1 - slides.mean()), "slip_right": right, "slip_ece": float(np.sum(gaps) / len(slip))}
 
 
-def course(found: list[dict]) -> list[float | None]:
-    """Median error of the point against time since the touch, mm."""
-    after, off = (np.concatenate([one[name] for one in found]) for name in ("after_s", "off"))
-    cells = [off[np.abs(after - t) < 0.5 * SLICES_S[0]] for t in SLICES_S]
-    return [float(np.median(cell)) if len(cell) else None for cell in cells]
-
-
-def draw(results: dict) -> Figure:
-    figure = Figure(figsize=(8, 4.2), layout="constrained")
-    axes = figure.subplots()
-    styles = ["-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2))]
-    for (kind, values), style in zip(results["course"].items(), styles, strict=True):
-        marker = "osv^Dx"[styles.index(style)]
-        axes.plot(1e3 * SLICES_S, values, linestyle=style, marker=marker, markersize=4, color="0.15", label=kind)
-    axes.axhline(1.0, color="0.6", linewidth=0.8)
-    axes.set(yscale="log", xlabel="time since the touch (ms)", ylabel="median error of the contact's place (mm)")
-    axes.grid(color="0.92")
-    axes.legend(frameon=False, fontsize=8, ncols=2)
-    return figure
-
-
 def run(build: Path, each: int = CONTACTS) -> None:
     """Measure all kinds with the friction known and not, and against a chain of links in MuJoCo."""
-    results: dict = {"tick_s": TICK_S, "first_s": FIRST_S, "kinds": {}, "course": {}, "whisked": {}}
+    results: dict = {"tick_s": TICK_S, "first_s": FIRST_S, "kinds": {}, "whisked": {}}
     for name, case in CASES.items():
         for kind in case.kinds:
             made = tqdm(contacts(case, kind, each), desc=f"{name}: {kind}", total=each)
             found = [follow(case, kind, scene, least) for scene, least in made]
             results["kinds"].setdefault(name, {})[kind] = summary(kind, found)
-            if name == "unknown":
-                results["course"][kind] = course(found)
     for kind in WHISKED:
         results["whisked"][kind] = verdicts(kind, list(tqdm(decided(kind, each), desc=f"whisked: {kind}", total=each)))
     store.write_result("contact", rounded(results))
-    store.write_page(ROOT / "docs/results/contact.md", page(results))
-    store.write_chart("contact_errors", draw(results))
 
 
 def rounded(value):

@@ -1,6 +1,6 @@
 """Measures the host's device side: cable to samples, whiskerd's instructions and memory, the clock mapping.
 
-    .venv/bin/python tools/benches host        bench/results/host.json, docs/charts/host_*.svg
+    .venv/bin/python tools/benches host        bench/results/host.json
 
 - Times: a simulated bridge (RTL, umockdev with its udev events, real libusb and hidapi) is plugged in, pulled and put
   back; watched from a reader of the ring. They hold the simulation's own work: its enumeration, and frames at its
@@ -26,11 +26,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from crunchbot.bridge.ring import Reader
-from crunchbot_lab.report import figures
 from crunchbot_lab.simulation.scenes import make_scene
 from whisker_protocol import LANES, LIMITS
 
@@ -49,11 +47,6 @@ SETTLE = 400  # frames after which a stream counts as up
 LOOK_S = 0.0002
 PATIENCE_S = 60
 CLOCK_SEEDS = (101, 102, 103)
-EVENTS = {
-    "plug": "plugged in: first sample",
-    "unplug": "pulled: daemon knows",
-    "replug": "put back: first sample",
-}
 
 
 def program(build: Path, name: str) -> str:
@@ -212,7 +205,6 @@ def clock(build: Path, seed: int) -> dict:
         "error_us_max": float(error.max()),
         "covered": float(np.mean(error <= rows["uncertainty_us"][settled])),
         "delay_us_max": float(rows["delay_us"].max()),
-        "rows": {name: values[::10].tolist() for name, values in rows.items()},
     }
 
 
@@ -221,48 +213,13 @@ def columns(text: str) -> dict[str, list[float]]:
     return {name: [float(row[name]) for row in rows] for name in rows[0]}
 
 
-# ---------------------------------------------------------------------------------------------------------------------
-# charts
-
-
-def draw_cable(times: dict) -> Figure:
-    figure = Figure(figsize=(6.4, 2.6), layout="constrained")
-    axes = figure.subplots()
-    for row, (event, marker) in enumerate(zip(EVENTS, "o^s", strict=True)):
-        values = 1e3 * np.array(times[event])
-        axes.plot(values, np.full(len(values), row), marker, color="0.25", fillstyle="none")
-        axes.annotate(f"median {np.median(values):.0f} ms", (1.0, row), xycoords=("axes fraction", "data"), va="center")
-    axes.set(yticks=range(len(EVENTS)), yticklabels=EVENTS.values(), xlabel="time (ms)", xlim=(0, None))
-    axes.set_ylim(len(EVENTS) - 0.5, -0.5)
-    axes.grid(axis="x", which="both", linewidth=0.3)
-    return figure
-
-
-def draw_clock(rows: dict) -> Figure:
-    figure = Figure(figsize=(6.4, 3.4), layout="constrained")
-    axes = figure.subplots()
-    minutes = np.array(rows["t_s"]) / 60
-    axes.plot(minutes, np.clip(rows["delay_us"], 1, None), ".", color="0.75", markersize=3, label="delay of an arrival")
-    axes.plot(minutes, np.abs(rows["error_us"]), "-", color="0.1", linewidth=1, label="error of the mapping")
-    axes.plot(minutes, rows["uncertainty_us"], "--", color="0.4", linewidth=1, label="uncertainty it states")
-    axes.axhline(100, color="0.3", linewidth=1, linestyle=":")
-    axes.annotate("goal: 100 us", (60, 100), ha="right", va="bottom", color="0.3")
-    axes.set(yscale="log", xlabel="time (minutes)", ylabel="time (us)", xlim=(0, 60))
-    axes.legend(loc="upper center", ncols=3, fontsize=8, bbox_to_anchor=(0.5, 1.15))
-    return figure
-
-
-# ---------------------------------------------------------------------------------------------------------------------
-
-
 def run(build: Path) -> None:
-    """Measure what is not measured yet, write results and charts."""
+    """Measure what is not measured yet, write results."""
     times = store.once(CACHE / "cable.json", lambda: cable_times(build))
     results = {
         "times_s": {event: {"median": float(np.median(t)), "max": max(t), "n": len(t)} for event, t in times.items()},
         "memory": store.once(CACHE / "memory.json", lambda: memory(build)),
     }
-    store.write_chart("host_cable", figures.svg(draw_cable, times))
     if shutil.which("valgrind"):
         counts = {
             str(b): store.once(CACHE / f"instructions_{b}.json", lambda b=b: instructions(build, b))
@@ -278,6 +235,5 @@ def run(build: Path) -> None:
     clocks = {
         str(seed): store.once(CACHE / f"clock_{seed}.json", lambda s=seed: clock(build, s)) for seed in CLOCK_SEEDS
     }
-    results["clock"] = {seed: {k: v for k, v in c.items() if k != "rows"} for seed, c in clocks.items()}
-    store.write_chart("host_clock", figures.svg(draw_clock, clocks[str(CLOCK_SEEDS[0])]["rows"]))
+    results["clock"] = clocks
     store.write_result("host", results)

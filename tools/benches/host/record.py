@@ -1,6 +1,6 @@
 """Records 28 lanes for an hour, accelerated: bytes per sample, frames lost, time; and counts instructions per frame.
 
-    .venv/bin/python tools/benches record        bench/results/record.json, docs/charts/record_cost.svg
+    .venv/bin/python tools/benches record        bench/results/record.json
 
 The frames are those of simulated robots that drive (level 1: world, whiskers, sensors), five of them to fill 28 lanes,
 two minutes long and repeated: a chunk of a recording holds two seconds and is packed on its own, so that repeating
@@ -18,14 +18,12 @@ import time
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from crunchbot.bridge.ring import FRAME, Reader, Writer
 from crunchbot.recording import read
 from crunchbot.recording.recorder import Recorder
 from crunchbot.recording.writing import RecordingWriter
-from crunchbot_lab.report import figures
 from crunchbot_lab.signals import World
 from crunchbot_lab.simulation.scenes import make_scene
 from whisker_protocol import LANES, LIMITS
@@ -139,34 +137,8 @@ def instructions_per_frame(period: np.ndarray) -> float:
     return (totals[1] - totals[0]) / (COUNTED[1] - COUNTED[0])
 
 
-def draw(results: dict) -> Figure:
-    """Bytes per sample against what crosses USB, and the recorder's share of the paper's netbook."""
-    figure = Figure(figsize=(8, 3), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    raw = FRAME.itemsize / LANES
-    names = {"ring, USB": raw, "recording,\nrobot drives": results["hour"]["bytes_per_sample"]}
-    names["recording,\nrobot stands"] = results["still"]["bytes_per_sample"]
-    bars = left.bar(list(names), list(names.values()), color=["#dcdcdc", "#0b5394", "#9fc5e8"], edgecolor="black")
-    left.bar_label(bars, fmt="%.2f")
-    left.set_ylabel("bytes per sample")
-    left.margins(y=0.15)
-    share = 100 * results["atom_share"]
-    bars = right.bar(
-        ["recorder,\n28 lanes at 2 kHz", "left"],
-        [share, 100 - share],
-        color=["#0b5394", "#ffffff"],
-        edgecolor="black",
-        hatch=["", "..."],
-    )
-    right.bar_label(bars, fmt="%.1f")
-    right.set_ylabel("% of the paper's netbook\n(0.8e9 instructions/s)")
-    right.margins(y=0.15)
-    return figure
-
-
 def run(build: Path) -> None:
-    """Measure what is not measured yet, write results and chart. `build` is not used: the Python module is what
-    counts."""
+    """Measure what is not measured yet. `build` is not used: the Python module is what counts."""
     cache = store.kept("record")
     cache.mkdir(parents=True, exist_ok=True)
     file = cache / "bench.mcap"
@@ -182,4 +154,3 @@ def run(build: Path) -> None:
     file.unlink(missing_ok=True)
     results["atom_share"] = results["instructions_per_frame"] * HZ / ATOM_HZ
     store.write_result("record", results)
-    store.write_chart("record_cost", figures.svg(draw, results))

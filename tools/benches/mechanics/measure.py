@@ -142,20 +142,6 @@ class Ours:
                 return float(angle)
         return float("inf")
 
-    def elastica(self, whisker, a: float, theta: float) -> float:
-        """The exact equation's moment with a plug, frictionless: bisection for the beam's own angle."""
-        unit = self.lib.mech_whisker_bending(whisker.c) / whisker.cone
-        bend = self.ffi.new("struct mech_bend *")
-        low, high = 0.0, theta
-        for _ in range(40 if np.isfinite(whisker.kappa) else 1):
-            middle = (low + high) / 2 if np.isfinite(whisker.kappa) else theta
-            there = self.lib.mech_elastica_at_angle(a / whisker.cone, middle, 0.0, 200, bend)
-            if not there or middle + bend.moment / (3 * whisker.kappa) > theta:
-                high = middle
-            else:
-                low = middle
-        return unit * bend.moment if there else float("nan")
-
     def hertz(self, case: dict) -> list[float]:
         whisker, modes = whisker_of(case), self.ffi.new("struct mech_modes *")
         self.lib.mech_modes_of(whisker.c, modes)
@@ -189,28 +175,6 @@ def measure_static(ours: Ours, bar) -> list[dict]:
             )
         slip = found["slipped_deg"]
         rows.append(case | {"points": points, "chain_slips_deg": slip, "slips_deg": ours.slip_deg(whisker, case["a"])})
-        bar.update()
-    return rows
-
-
-def measure_links(ours: Ours, bar) -> list[dict]:
-    """Error of 5, 10 and 20 links against the exact elastica, in a plug with kappa 1."""
-    rows = []
-    for links in LINKS:
-        points = []
-        for a in (80, 100, 120, 130):
-            case = {"tip": 0.3e-3, "kappa": 1.0, "friction": 0.0, "a": a * 1e-3}
-            job = spec(case["tip"], 1.0, links, friction=0.0, a=case["a"], angles_deg=ANGLES)
-            whisker = whisker_of(case)
-            for row in chain("static", job)["rows"]:
-                exact = ours.elastica(whisker, row["a"], row["theta"])
-                errors = {"chain": row["moment"] / exact - 1}
-                errors |= {
-                    name: getattr(ours, name)(whisker, row["a"], row["theta"]) / exact - 1
-                    for name in ("closed", "large")
-                }
-                points.append({"a": a, "theta_deg": float(np.degrees(row["theta"])), **errors})
-        rows.append({"links": links, "points": points})
         bar.update()
     return rows
 

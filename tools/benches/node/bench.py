@@ -1,7 +1,6 @@
 """Measures the whisker node: random faults, fastest link, skew between nodes, time to the armed record, processor load.
 
     .venv/bin/python tools/benches node        bench/results/node.json, node_faults.json and node_cuts.json,
-                                                docs/results/node_faults.md, docs/charts/node_*.svg
 
 All on the register model of the chip and the edge-by-edge model of the sensor; nothing here has run on silicon. A
 thousand batches of a thousand fault schedules take about six minutes of one core; what is done is kept.
@@ -16,21 +15,16 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from crunchbot_lab.report import figures
 from whisker_protocol import LIMITS
 
 from .. import store
-from . import odds, page
 
-ROOT = Path(__file__).resolve().parents[3]
 BATCHES, CHUNK, PROCESSES = 1000, 50, 2
 NODES, TICKS = 28, 10_000
 TICK_CYCLES = 19_300  # of 500 us at the slowest oscillator
 CONVERSION_NS = 350_000  # the sensor's longest in fast mode
-CYCLES_PER_US = LIMITS["clock_hz"] / 1e6
 LINK_TICKS = 100
 DIVIDERS = (4, 6, 8, 12, 16, 24, 32)
 WAYS = ("lines", "links")
@@ -60,24 +54,13 @@ def storm(build: Path, kept: Path, batches: int) -> dict:
         chunks = list(tqdm(pool.map(chunk, firsts), total=len(firsts), desc="fault schedules"))
     lines = [line for lines in chunks for line in lines]
     injected = {kind: sum(line["injected"][kind] for line in lines) for kind in lines[0]["injected"]}
-    classes = {way: {name: fate(name, [line[way][name] for line in lines]) for name in lines[0][way]} for way in WAYS}
+    classes = {way: {name: fate([line[way][name] for line in lines]) for name in lines[0][way]} for way in WAYS}
     return {name: sum(line[name] for line in lines) for name in TOTALS} | {"injected": injected} | classes
 
 
-def fate(name: str, parts: list[list]) -> dict:
-    """A class of damage: how often it passed the checks, and how often it should."""
-    totals = np.sum(parts, axis=0).tolist()
-    events, passed, good = (int(total) for total in totals[:3])
-    derived = odds.derived(name, totals) if events else (None, None)
-    return {
-        "events": events,
-        "passed": passed,
-        "passed_95": odds.interval(passed, events),
-        "passed_derived": derived[0],
-        "good": good,
-        "good_95": odds.interval(good, events),
-        "good_derived": derived[1],
-    }
+def fate(parts: list[list]) -> dict:
+    """A class of damage: how often it passed the checks, and how often it was a good sample then."""
+    return dict(zip(("events", "passed", "good"), np.sum(parts, axis=0).astype(int).tolist(), strict=False))
 
 
 def least(lowest: int, highest: int, step: int, lossless) -> int | None:
@@ -133,62 +116,6 @@ def load(build: Path) -> dict:
     }
 
 
-def skew_chart(rows: dict) -> Figure:
-    """Spread over the nodes of each tick's sampling instant: what the nodes add."""
-    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
-    axes = figure.subplots()
-    styles = {"equal": ("-", "o"), "2 %": ("--", "^"), "4 %": (":", "s")}
-    for name, data in rows.items():
-        spread = np.sort(np.ptp(data[:, :, 0], axis=0)) / 1000
-        share = np.linspace(0, 1, len(spread))
-        line, marker = styles[name]
-        axes.plot(spread, share, line, marker=marker, markevery=0.2, color="#0b5394", label=f"clocks {name}")
-    axes.set_title("What nodes add to the skew: 28 nodes, 10 000 ticks", fontsize=10)
-    axes.set_xlabel("SYNC to latch, spread over 28 nodes (us)")
-    axes.set_ylabel("share of ticks")
-    axes.set_xlim(left=0)
-    axes.legend()
-    return figure
-
-
-def age_chart(rows: dict) -> Figure:
-    """What the sensors add: the age of their conversions, and its spread within a tick."""
-    figure = Figure(figsize=(9.6, 4.0), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    ages, instants = rows["2 %"][:, :, 1] / 1000, (rows["2 %"][:, :, 0] - rows["2 %"][:, :, 1]) / 1000
-    left.hist(ages.ravel(), bins=80, color="#b4b4b4", edgecolor="#404040", histtype="stepfilled")
-    for name in ("sensor_age_min", "sensor_age_max"):
-        left.axvline(LIMITS[name] / 1000, color="black", linestyle="--")
-        left.annotate(f" {name}", (LIMITS[name] / 1000, 1.0), xycoords=("data", "axes fraction"), rotation=90, va="top")
-    left.set_title("Age of the conversion that is read", fontsize=10)
-    left.set_xlabel("age at the latch (us)")
-    left.set_ylabel("samples of 28 sensors, 10 000 ticks")
-    spread = np.sort(np.ptp(instants, axis=0))
-    right.plot(spread, np.linspace(0, 1, len(spread)), color="#0b5394")
-    right.set_title("True instants within a tick", fontsize=10)
-    right.set_xlabel("spread over 28 sensors (us)")
-    right.set_ylabel("share of ticks")
-    right.set_xlim(left=0)
-    return figure
-
-
-def link_chart(found: dict) -> Figure:
-    """The least gap between words at each SCK."""
-    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
-    axes = figure.subplots()
-    known = {divider: gap for divider, gap in found["gap_cycles"].items() if gap is not None}
-    mhz = [CYCLES_PER_US / divider for divider in known]
-    axes.plot(mhz, [gap / CYCLES_PER_US for gap in known.values()], "o-", color="#0b5394", label="least without loss")
-    axes.axhline(LIMITS["word_gap_min"] / CYCLES_PER_US, color="black", linestyle="--", label="least the bridge takes")
-    axes.axvline(CYCLES_PER_US / LIMITS["sck_divider_min"], color="black", linestyle=":", label="fastest it takes")
-    axes.set_title("Gap between words that every node follows", fontsize=10)
-    axes.set_xlabel("SCK (MHz)")
-    axes.set_ylabel("gap between words (us)")
-    axes.set_ylim(bottom=0)
-    axes.legend()
-    return figure
-
-
 def table(build: Path, program: str, name: str) -> list[dict]:
     """What a test program writes down of its cases, kept among the results."""
     subprocess.run([build / "tests/node" / program, store.RESULTS / f"{name}.json"], check=True)
@@ -196,25 +123,13 @@ def table(build: Path, program: str, name: str) -> list[dict]:
     return store.read_result(name)
 
 
-def draw(name: str, chart, *data) -> None:
-    """docs/charts/NAME.svg."""
-
-    def figure(_):
-        return chart(*data)
-
-    figure.__name__ = name
-    store.write_chart(name, figures.svg(figure, None))
-
-
 def skew(build: Path) -> dict:
-    """Where the nodes' sampling instants lie, and how late their records are armed; draws them."""
+    """Where the nodes' sampling instants lie, and how late their records are armed."""
     rows = {name: timing(build, spread)[0] for name, spread in tqdm(SPREADS.items(), desc="skew")}
     armed = {
         f"clocks {'equal' if not ppm else f'{-ppm // 10_000} % slow'}": timing(build, (ppm, 100), ticks=500)[0][:, :, 2]
         for ppm in (0, -20_000, -40_000)
     }
-    draw("node_skew", skew_chart, rows)
-    draw("node_age", age_chart, rows)
     return {
         "skew": {
             name: {
@@ -240,12 +155,6 @@ def tables(build: Path) -> dict:
     return {"fault_rows": len(faults) + len(cuts), "worst_lost": dict(worst)}
 
 
-def fastest(build: Path) -> dict:
-    found = link(build)
-    draw("node_link", link_chart, found)
-    return {"link": found}
-
-
 def run(build: Path, only: str = "", batches: int = BATCHES) -> None:
     """All of it, or only one part: the others stay as they were measured before."""
     kept = store.kept("node")
@@ -253,7 +162,7 @@ def run(build: Path, only: str = "", batches: int = BATCHES) -> None:
     parts = {
         "faults": lambda: tables(build),
         "storm": lambda: {"storm": storm(build, kept, batches)},
-        "link": lambda: fastest(build),
+        "link": lambda: {"link": link(build)},
         "skew": lambda: skew(build),
         "load": lambda: {"load": load(build)},
     }
@@ -261,8 +170,6 @@ def run(build: Path, only: str = "", batches: int = BATCHES) -> None:
     for name in [only] if only else PARTS:
         result |= parts[name]()
     store.write_result("node", result)
-    faults, cuts = (store.read_result(name) for name in ("node_faults", "node_cuts"))
-    store.write_page(ROOT / "docs/results/node_faults.md", page.page(result, faults, cuts))
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -1,16 +1,9 @@
 """Radial distance: errors, sureness, time and stability of the paper's line, curves and whole whisks.
 
-    make bench, or .venv/bin/python tools/benches radial [--whisker3d DIR]
-
 Whiskers are drawn from a batch (stiffness, creep, friction, gain), calibrated with the paper's 5 whisks at 6 radii, and
-judged on others. A real whisker's recordings are not part of this project: clone
-github.com/BioMorphic-Intelligence-Lab/Whisker-3D-Localization and give its folder dataset, here or as WHISKER3D_DIR;
-without it that part is skipped by name. Writes
-bench/results/radial*.json, docs/results/radial_real.md and docs/charts/radial_*.
+judged on others.
 """
 
-import argparse
-import os
 import time
 from pathlib import Path
 
@@ -26,12 +19,11 @@ from crunchbot_lab.report.figures import SETTINGS
 from crunchbot_lab.scenes.sweep import sweep
 
 from .. import store
-from .real import METHODS, page, real_whisker
 from .trials import PAPER_MM, RADII_MM, SOURCES, SPOILS, SPREADS, Kind, Set, Whisker, recorded, spoilt
 
-ROOT = Path(__file__).resolve().parents[3]
 CACHE = store.kept("radial")
 SEED = 48611  # chosen after the last change to the models; nothing was developed on these whiskers
+METHODS = ("paper", "quadratic", "rational", "whisk", "press", "default")
 WHISKERS, FIT, HELD = 4, 5, 6  # whiskers of each spread; whisks at each radius
 TIP_WHISKERS = 24  # of each spread: shares near 98 % ask for many whisks
 LIMIT_MM, NEAR_MM = RADII_MM[-1] - 3.0, 3.0  # of tip and shaft; nearer to it nothing is asked
@@ -238,43 +230,6 @@ def measured(part: str) -> dict:
     return PARTS[part]()
 
 
-LOOKS = {"paper": "o", "quadratic": "s", "rational": "^", "whisk": "D", "press": "v"}
-
-
-def draw_cost(results: dict) -> Figure:
-    """Radial error against cost, one panel a whisker, the oracle's bound as a line."""
-    us = results["cost"]["contact_us"]
-    cost_of = {
-        "paper": us["paper"],
-        "quadratic": us["paper"] * 1.01,
-        "rational": us["paper"] * 1.02,
-        "whisk": us["whisk"],
-        "press": us["press"],
-    }
-    figure = Figure(figsize=(10.4, 3.4), layout="constrained")
-    panels = figure.subplots(1, len(SPREADS), sharey=True, sharex=True)
-    for n, (axes, spread) in enumerate(zip(panels, SPREADS, strict=True)):
-        scores = results["errors"]["duration"][f"{spread:g}"]
-        for name, marker in LOOKS.items():
-            axes.plot(
-                cost_of[name],
-                scores[name],
-                marker,
-                color="#0b5394" if name == "whisk" else "#6b6b6b",
-                mfc="none" if name in ("quadratic", "rational") else None,
-                ms=8,
-                label=name,
-            )
-        axes.axhline(scores["oracle"], color="k", lw=1, ls="--", label="oracle: knows the angle")
-        axes.axhline(PAPER_MM[n], color="#8a8a8a", lw=1, ls=":", label="paper, as printed")
-        axes.set(xscale="log", xlabel=f"us per contact of {results['cost']['samples']} samples", ylim=(0, 7))
-        axes.set_title(f"whisker {n + 1}: spread {100 * spread:.1f} %", fontsize=10)
-    panels[0].set_ylabel("standard error (mm)")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=6)
-    return figure
-
-
 def draw_fig5(results: dict) -> Figure:
     """As the paper's Fig. 5."""
     figure = Figure(figsize=(10.4, 3.2), layout="constrained")
@@ -289,15 +244,8 @@ def draw_fig5(results: dict) -> Figure:
     return figure
 
 
-def run(build: Path, whisker3d: str | None = None) -> None:
-    """Measure what is not yet measured, and redraw. `build` is not used: the C library comes with the Python module."""
-    folder = whisker3d or os.environ.get("WHISKER3D_DIR")
-    if folder:
-        real = _rounded(real_whisker(Path(folder)))
-        store.write_result("radial_real", real)
-        store.write_page(ROOT / "docs/results/radial_real.md", page(real))
-    else:
-        store.leave_out("real whisker", "give --whisker3d DIR or WHISKER3D_DIR (tools/benches radial --help)")
+def run(_build: Path) -> None:
+    """Measure what is not yet measured, and redraw. The C library comes with the Python module."""
     results = sweep(measured, {name: {"part": name} for name in PARTS}, CACHE, label="radial")
     results["cost"] = store.once(CACHE / "cost.json", cost)  # not beside the others, for it measures time
     points = results["fig5"]["whiskers"]
@@ -306,12 +254,7 @@ def run(build: Path, whisker3d: str | None = None) -> None:
     }
     store.write_result("radial", _rounded(kept))
     with matplotlib.rc_context(SETTINGS | {"svg.hashsalt": "whisker"}):
-        for name, draw in (("radial_cost", draw_cost), ("radial_fig5", draw_fig5)):
-            store.write_chart(name, draw(results))
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--whisker3d", metavar="DIR", help="Whisker-3D-Localization's dataset")
+        store.write_chart("radial_fig5", draw_fig5(results))
 
 
 def _rounded(values):

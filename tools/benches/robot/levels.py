@@ -10,13 +10,11 @@ import resource
 import shutil
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from crunchbot import scene as scene_files
@@ -246,8 +244,7 @@ def measure(build: Path, cache: Path, levels: set[int]) -> None:
 
 
 def gather(cache: Path) -> dict:
-    """Everything measured so far: {"runs": case -> seed -> scores, "levels": summary, "pairs": differences,
-    "equal"}."""
+    """Everything measured so far: {"levels": summary, "pairs": differences, "rtl_rows_equal_bytes"}."""
     runs = {
         case.name: {
             str(seed): json.loads(path.read_text())
@@ -265,7 +262,7 @@ def gather(cache: Path) -> dict:
     kept = {name: {seed: _without_rows(run) for seed, run in by.items()} for name, by in runs.items()}
     levels = {name: summary(list(by_seed.values())) for name, by_seed in kept.items()}
     pairs = {f"{a} - {b}": paired(kept[a], kept[b]) for a, b in PAIRS if a in kept and b in kept}
-    return {"seconds": SECONDS, "levels": levels, "pairs": pairs, "rtl_rows_equal_bytes": equal, "runs": kept}
+    return {"seconds": SECONDS, "levels": levels, "pairs": pairs, "rtl_rows_equal_bytes": equal}
 
 
 def _without_rows(run: dict) -> dict:
@@ -288,82 +285,3 @@ def paired(ours: dict[str, dict], theirs: dict[str, dict]) -> dict:
         means = rng.choice(difference, (DRAWS, len(difference))).mean(axis=1)
         out[key] = {"mean": float(difference.mean()), "interval": [float(v) for v in np.percentile(means, INTERVAL)]}
     return out
-
-
-# ---------------------------------------------------------------------------------------------------------------------
-
-ERROR_TICKS_M = (0.02, 0.05, 0.1, 0.2, 0.5)
-SHOWN = (
-    ("adaptive_error_median_m", "o", "black", "adaptive"),
-    ("pose_error_median_m", "s", "0.45", "grid"),
-    ("foveal_error_median_m", "^", "0.7", "foveal (the paper's)"),
-)
-
-
-def draw(found: dict) -> Figure:
-    """A row for each level, the fastest last: real-time factor, errors, texture. Medians over seeds, bars between
-    quartiles."""
-    ordered = sorted(found["levels"].items(), key=lambda item: item[1]["realtime_factor"])
-    figure = Figure(figsize=(11.0, 0.48 * len(ordered) + 1.6), layout="constrained")
-    speed, error, texture = figure.subplots(1, 3, sharey=True, width_ratios=(2, 3, 2))
-    speed.plot(
-        [level["realtime_factor"] for _, level in ordered], range(len(ordered)), "D-", color="0.2", linewidth=0.8
-    )
-    for n, (key, marker, colour, label) in enumerate(SHOWN):
-        _draw_points(error, ordered, key, 0.17 * (n - 1), marker, colour, label)
-    _draw_points(texture, ordered, "texture_accuracy", 0.0, "o", "black", None, 100.0)
-    speed.set(xscale="log", xlabel="simulated seconds per\nprocessor second, world to poses")
-    speed.axvline(1.0, color="0.3", linewidth=0.8, linestyle=":")
-    error.set(xscale="log", xlabel="median position error over 60 s (m)")
-    error.set_xticks(ERROR_TICKS_M, map(str, ERROR_TICKS_M))
-    error.minorticks_off()
-    texture.set(xlabel="texture windows right (%)")
-    speed.set_yticks(range(len(ordered)), [f"{TITLES[name]} (n={level['seeds']})" for name, level in ordered])
-    for axes in (speed, error, texture):
-        axes.grid(axis="both", linewidth=0.3)
-    figure.legend(*error.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
-    return figure
-
-
-def _draw_points(axes, ordered, key: str, shift: float, marker: str, colour: str, label: str | None, scale=1.0) -> None:
-    y = [row + shift for row in range(len(ordered))]
-    low, middle, high = scale * np.array([level["quartiles"][key] for _, level in ordered]).T
-    bars = (middle - low, high - middle)
-    axes.errorbar(middle, y, xerr=bars, fmt=marker, color=colour, label=label, capsize=2, linewidth=0.9)
-
-
-def draw_pairs(found: dict) -> Figure:
-    """Paired differences with their intervals."""
-    figure = Figure(figsize=(9.5, 4.2), layout="constrained")
-    panels = figure.subplots(1, 3, sharey=True)
-    names = list(found["pairs"])
-    keys = (
-        ("adaptive_error_median_m", 1000.0, "adaptive: error (mm)"),
-        ("pose_error_median_m", 1000.0, "grid: error (mm)"),
-    )
-    for axes, (key, scale, title) in zip(
-        panels, (*keys, ("texture_accuracy", 100.0, "texture right (points)")), strict=True
-    ):
-        for row, name in enumerate(names):
-            pair = found["pairs"][name][key]
-            low, high = (scale * value for value in pair["interval"])
-            enough = found["pairs"][name]["seeds"] >= LEAST_SEEDS
-            axes.plot([low, high] if enough else [], [row, row] if enough else [], color="0.4")
-            certain = enough and (low > 0 or high < 0)
-            axes.plot(scale * pair["mean"], row, "ko", fillstyle="full" if certain else "none")
-        axes.axvline(0.0, color="0.3", linewidth=0.8, linestyle=":")
-        axes.set(
-            xlabel=f"difference, {title}",
-            yticks=range(len(names)),
-            yticklabels=map(_pair_title, names, [found] * len(names)),
-        )
-    panels[0].invert_yaxis()
-    return figure
-
-
-def _pair_title(name: str, found: dict) -> str:
-    ours, theirs = name.split(" - ")
-    return f"{TITLES[ours]}\nless {TITLES[theirs]} (n={found['pairs'][name]['seeds']})"
-
-
-DRAWINGS: dict[str, Callable[[dict], Figure]] = {"robot_levels": draw, "robot_level_pairs": draw_pairs}

@@ -6,8 +6,7 @@ Simulated floors (level 1) are drawn from seeds that nothing was developed on. R
 project: clone github.com/wngfra/FabricSlide (MIT) and github.com/norlab-ulaval/BorealTC (MIT) and give their folders
 data/fabric, data/borealtc and data/vulpi (in BorealTC), here or as FABRICSLIDE_DIR, BOREALTC_DIR and VULPI_DIR; without
 them their parts are skipped by name.
-Writes bench/results/texture.json,
-docs/results/texture.md and docs/charts/texture_*.
+Writes bench/results/texture.json.
 """
 
 import argparse
@@ -17,18 +16,13 @@ from pathlib import Path
 from tqdm import tqdm
 
 from .. import store
-from .charts import draw
 from .cost import cost
-from .course import course
-from .page import page
 from .real import boreal, boreal_left_out, fabrics, fabrics_left_out, vulpi_left_out, vulpi_terrains
 from .simulated import borders, floors_left_out, other_robot, refusals, single_surfaces, stability
 from .surfaces import faces, faces_contact
 
-ROOT = Path(__file__).resolve().parents[3]
-PAGE = ROOT / "docs/results/texture.md"
 CACHE = store.kept("texture")
-FLOORS = (course, cost, single_surfaces, other_robot, borders, refusals, floors_left_out, stability)
+FLOORS = (cost, single_surfaces, other_robot, borders, refusals, floors_left_out, stability)
 PARTS = {f.__name__: f for f in (*FLOORS, faces, faces_contact)}
 REAL = {  # by the folder that is given
     "fabricslide": {"fabricslide": fabrics, "fabrics_left_out": fabrics_left_out},
@@ -38,7 +32,7 @@ REAL = {  # by the folder that is given
 
 
 def run(build: Path, **folders: str | None) -> None:
-    """Measure what is not yet measured, and redraw. `build` is not used: the C library comes with the Python module."""
+    """Measure what is not yet measured. `build` is not used: the C library comes with the Python module."""
     given = {n: folders.get(n) or os.environ.get(f"{n.upper()}_DIR") for n in REAL}
     parts = dict(PARTS)
     for folder, name, measure in ((f, n, m) for f, some in REAL.items() for n, m in some.items()):
@@ -52,9 +46,6 @@ def run(build: Path, **folders: str | None) -> None:
     for name, measure in tqdm(parts.items(), desc="texture"):
         results[name] = store.once(CACHE / f"{name}.json", measure)
     store.write_result("texture", results)
-    store.write_page(PAGE, page(results))
-    for name, figure in draw(results).items():
-        store.write_chart(name, figure)
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -1,0 +1,122 @@
+"""Tables of docs/results/simulation.md, of the demo's page and of docs/boards.md."""
+
+from ..store import read_result
+from ..tables import lined, named, table
+
+PAPER_MM = (5.68, 2.78, 1.82, 4.37)  # the paper's errors of whiskers 1 to 4
+WAYS, CELLS = ("out_ns", "in_ns", "through_ns"), ("LUT", "FF", "block RAM", "distributed RAM")
+GOAL_MHZ = 60.0
+
+
+def placed() -> str:
+    """The default command of every board at every number of lanes that has been placed."""
+    rows = []
+    for board in (board for _, board in sorted(read_result("bridge")["boards"].items())):
+        for run in (run for run in board["runs"] if "seed" in run):
+            ways = [f"{run[way]:.1f} of {board['limits'][way]:.1f} ns" if board["limits"] else "-" for way in WAYS]
+            least = board["least"].get("shortest_in_ns")
+            rows.append(
+                [f"{board['title']} ({board['part']}, grade {board['speed']}), {run['lanes']}", str(run["seed"])]
+                + [f"{run['fmax_mhz']:.1f} MHz: {100 * (run['fmax_mhz'] / GOAL_MHZ - 1):.1f} % to spare", *ways]
+                + ["-" if least is None else f"{run['shortest_in_ns']:.1f} of {least:.1f} ns"]
+                + [*(str(run["used"][cell]) for cell in CELLS), "; ".join(run["problems"]) or "none"]
+            )
+    head = ["board, lanes", "seed", "clock reached (goal: 60)", "out", "in", "through", "shortest in, at least", *CELLS]
+    return table([*head, "problem"], rows)
+
+
+def chain() -> str:
+    found = read_result("chain_speed")
+    rows = [{"what": "whole chain to the pilot, SCK/6", "cycles_per_tick": None} | run for run in found["whole_chain"]]
+    rows += [{"what": f"bridge and nodes, {link}"} | run for link, runs in found["bridge"].items() for run in runs]
+    columns = {"what runs": "{what}", "lanes": "{lanes}", "cycles per tick": "{cycles_per_tick:.0f}"}
+    return lined(rows, columns | {"times real time": "{realtime_factor:.2f}"})
+
+
+def levels() -> str:
+    found = read_result("levels")
+    first, *others = found
+    rows = []
+    for runs in zip(*found.values(), strict=True):
+        factors = [run["realtime_factor"] for run in runs]
+        rows.append(
+            [str(runs[0]["lanes"]), *(f"{f:.3g}" for f in factors), *(f"{factors[0] / f:.3g}" for f in factors[1:])]
+        )
+    return table(["lanes", *found, *(f"{first} / {other}" for other in others)], rows)
+
+
+def usb() -> str:
+    bad = ("gaps", "duplicates", "wrong", "stale", "answered", "unexplained", "hangs")
+    found = read_result("usb_soak")
+    names = ("seeds", "frames", "packets", "wire_faults", "noise", "restarts", "resets", *bad)
+    return table(["what", "count"], [[name, str(found[name])] for name in names])
+
+
+def demo_errors() -> str:
+    run = read_result("demo")
+    rows = []
+    for key, name in {
+        "adaptive": "adaptive",
+        "pose": "grid",
+        "foveal": "foveal grid",
+        "odometry": "odometry alone",
+    }.items():
+        p90 = run.get(f"{key}_error_p90_m")
+        rows.append([name, f"{1000 * run[f'{key}_error_median_m']:.0f}", "" if p90 is None else f"{1000 * p90:.0f}"])
+    return table(["estimate", "median position error, mm", "90 % of the rows, mm"], rows)
+
+
+def demo() -> str:
+    run = read_result("demo")
+    return lined(
+        [{"what": what, "value": value.format_map(run)} for what, value in DEMO.items()]
+        + [{"what": "both are the same records", "value": "yes" if run["records_bad_match"] else "no"}]
+        + [
+            {"what": what, "value": f"{100 * run[key]:.1f} %"}
+            for what, key in (
+                ("texture decisions right, 50 mm inside a tile", "texture_accuracy"),
+                ("the same, tips near borders too", "texture_accuracy_all"),
+                ("share of the moving windows that were read", "texture_windows_share"),
+            )
+        ],
+        {"figure": "{what}", "value": "{value}"},
+    )
+
+
+DEMO = {
+    "frames sent, received, lost": "{frames_sent}, {frames_received}, {frames_lost}",
+    "USB faults put in": "{usb_faults_injected}",
+    "bad records put in, reported": "{records_bad_injected}, {records_bad_reported}",
+    "median heading error, grid": "{heading_error_median_rad:.3f} rad",
+}
+
+
+def demo_radial() -> str:
+    run = read_result("demo")
+    pairs = zip(run["radial_std_mm"].values(), run["radial_std_predicted_mm"].values(), PAPER_MM, strict=True)
+    rows = [[str(n), *(f"{value:.2f}" for value in of)] for n, of in enumerate(pairs, 1)]
+    return table(["whisker", "measured", "predicted", "paper"], rows)
+
+
+def fuzz() -> str:
+    found = read_result("fuzz")
+    rows = [*sorted(named(found["targets"], "target"), key=lambda row: row["target"]), {"target": "all"} | found]
+    return lined(rows, {"target": "{target}", "inputs": "{inputs}", "crashes": "{crashes}"})
+
+
+def latency() -> str:
+    def us(name: str) -> str:
+        return "{%s[median_us]:.0f}, worst {%s[worst_us]:.0f} us" % (name, name)  # noqa: UP031
+
+    return lined(
+        read_result("bridge_timing"),
+        {
+            "node link": lambda run: f"SCK/{run['sck_divider']}, gap {run['word_gap'] / 60:g} us",
+            "ticks": lambda run: f"{60e6 / run['tick_period']:.0f} Hz",
+            "sent": lambda run: "every frame at once" if run["every_frame"] else "two frames a packet",
+            "SYNC to the end of its packet": us("packet"),
+            "of its transfer, batch 2": us("batch_2"),
+            "batch 4": us("batch_4"),
+            "frames with a bad record": "{bad_records} of {frames}",
+        },
+    )

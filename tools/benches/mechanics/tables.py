@@ -1,0 +1,50 @@
+"""Tables of docs/results/mechanics.md."""
+
+from ..store import read_result
+from ..tables import lined, table
+from .measure import LEVELS
+
+TITLES = {name: title for name, (title, *_) in LEVELS.items()}
+
+
+def summary() -> str:
+    found = read_result("mechanics")
+    s, edges = found["summary"], found["edges"]
+    return table(
+        ["figure", "value"],
+        [
+            ["MuJoCo", found["mujoco"]],
+            [
+                f"base moment, {s['points']} points to slip-off, large deflection: worst",
+                f"{s['large_worst_percent']:.1f} %",
+            ],
+            ["the same: RMS", f"{s['large_rms_percent']:.2f} %"],
+            ["the same, closed form up to 5 degrees: worst", f"{s['closed_worst_percent_to_5_deg']:.1f} %"],
+            ["natural frequencies: worst", f"{s['frequency_worst_percent']:.2f} %"],
+            ["edges: cases in which chains of 20 and 40 links agree", f"{edges['chains_agree']} of {edges['cases']}"],
+            ["in these `static` agrees with 20 links", f"{edges['static_met']}"],
+            ["in these `modes` agrees with 20 links", f"{edges['modes_met']}"],
+        ],
+    )
+
+
+def speed() -> str:
+    found = read_result("mechanics")["summary"]["times_real"]
+    rows = [[TITLES.get(name, f"MuJoCo, {name[7:]} links"), f"{factor:.3g}"] for name, factor in found.items()]
+    return table(["mechanics", "times real time"], rows)
+
+
+def edges() -> str:
+    held = "{%s[held_s]:1e3*.1f}, {%s[peak]:1e6*.1f}"
+    return lined(
+        read_result("mechanics")["at_edges"],
+        {"step mm": "{height_mm:g}", "m/s": "{speed:g}"}
+        | {
+            f"{name.replace('chain_', '')} held, peak": held % (name, name)
+            for name in ("static", "modes", "chain_20", "chain_40")
+        }
+        | {
+            name: lambda row, name=name: "agrees" if row[f"{name}_agrees"] else "differs"
+            for name in ("static", "modes")
+        },
+    )

@@ -1,0 +1,176 @@
+"""Tables of docs/results/nav.md and nav_unseen.md."""
+
+from crunchbot.nav import localise
+
+from ..store import read_result
+from ..tables import lined, named, table
+
+OURS = localise.default_filter()
+PEER = ("filterpy", "particles", "pfilter", "mrpt")  # the first words of other projects' filters
+
+
+def pareto() -> str:
+    return lined(
+        named(read_result("nav_pareto"), "family", "filter"),
+        {
+            "family": "{family}",
+            "filter": "{filter}",
+            "runs": "{runs}",
+            "us/step": "{us:.3g}",
+            "p99 us": "{us_p99:.3g}",
+            "median error mm (middle half)": "{error_m:1e3*.1f} ({error_low_m:1e3*.1f}-{error_high_m:1e3*.1f})",
+            "RMS mm": "{rms_m:1e3*.1f}",
+        },
+    )
+
+
+def dominated() -> str:
+    """By family: the points that are at least as quick and as near as the default filter."""
+    rows, peers = [], read_result("nav_peers")
+    for family, points in read_result("nav_pareto").items():
+        us, error = points[OURS]["us"], points[OURS]["error_m"]
+        mine = [title for title, p in points.items() if title != OURS and p["us"] <= us and p["error_m"] <= error]
+        theirs = [p for p in peers if p["family"] == family and p["filter"].split()[0] in PEER]
+        better = [p["filter"] for p in theirs if p["step_us_median"] <= us and p["error_median_m"] <= error]
+        rows.append([family, ", ".join(better) or ("none" if theirs else "not run"), ", ".join(mine) or "none"])
+    return table(["family", "of other projects", "of our own filters"], rows)
+
+
+def peers() -> str:
+    return lined(
+        read_result("nav_peers"),
+        {
+            "family": "{family}",
+            "filter": "{filter} {setting}",
+            "runs": "{seeds}",
+            "us/step": "{step_us_median:.3g}",
+            "p99 us": "{step_us_p99:.3g}",
+            "median error mm": "{error_median_m:1e3*.1f}",
+            "RMS mm": "{error_rms_m:1e3*.1f}",
+            "never locked, %": "{lost_share:100*.0f}",
+        },
+    )
+
+
+def matrix() -> str:
+    rows = named(read_result("nav_matrix")["rows"], "row")
+    names = [key for key in rows[0] if key != "row"]
+
+    def of(name: str):
+        def shown(row: dict) -> str:
+            c = row[name]
+            held = "-" if c["coverage_90"] is None else f"{100 * c['coverage_90']:.0f} %"
+            return f"{100 * c['near_at_end']:.0f} %, {100 * c['error_m']:.1f}, {held}"
+
+        return shown
+
+    return lined(rows, {"row": "{row}"} | {name: of(name) for name in names})
+
+
+def stability() -> str:
+    """A row a filter over the whole matrix."""
+    found = read_result("nav_matrix")
+    rows = []
+    for name, sure in found["confidence"].items():
+        cells = {title: row[name] for title, row in found["rows"].items()}
+        held = [c["coverage_90"] for c in cells.values() if c["coverage_90"] is not None]
+        rows.append(
+            [name, f"{sum(c['near_at_end'] >= 0.98 for c in cells.values())} of {len(cells)}"]
+            + [f"{100 * min(held):.0f} to {100 * max(held):.0f}", str(sum(c["faulty_rows"] for c in cells.values()))]
+            + [f"{sure['auc']:.3f}", f"{sure['calibration_error']:.3f}"]
+        )
+    head = ["filter", "faults after which all runs are near", "90 % region holds, %, least and most"]
+    return table([*head, "invalid results", "confidence: area under curve", "calibration error"], rows)
+
+
+UNSEEN = {
+    "locked": "{locked} of {runs}",
+    "rows to lock": "{rows_to_lock:.0f}",
+    "error, mm": "{error_mm:.1f}",
+    "truths within the 90 % region": "{coverage_90:.2f}",
+    "its area, cm2": "{region_90_cm2:.1f}",
+    "sure and wrong, %": "{sure_wrong:100*.1f}",
+    "us a row": "{us:.0f}",
+}
+
+
+def unseen() -> str:
+    return lined(named(read_result("nav_unseen")["families"], "family"), {"family, start": "{family}"} | UNSEEN)
+
+
+WANTED_MM = {"anchor": 20, "robot": 35, "raw": 45, "noisy": 80}
+
+
+def maps(part: str) -> str:
+    """Families of a part of the result."""
+
+    def name(row: dict) -> str:
+        return row["family"] if row["rows"] == 3000 else f"{row['family']}, {row['rows'] / 600:.0f} min"
+
+    return lined(
+        named(read_result("map")[part], "family"),
+        {
+            "family": name,
+            "runs": "{runs}",
+            "wanted, mm": lambda row: WANTED_MM.get(row["family"].removesuffix("+gyro").removesuffix("+normals"), ""),
+            "error, mm": "{error_median_m:1e3*.0f}",
+            "worst, mm": "{error_worst_m:1e3*.0f}",
+            "odometry better in": "{worse_than_odometry}",
+            "from the first pose, mm": "{anchored_median_m:1e3*.0f}",
+            "odometry, mm": "{odometry_error_median_m:1e3*.0f}",
+            "90 % regions hold, %": "{coverage_90:100*.0f}",
+            "faces right, %": "{faces_right:100*.0f}",
+            "corners found, %": "{corners_found:100*.0f}",
+            "false, %": "{corners_false:100*.0f}",
+            "tiles said, %": "{tiles_said:100*.0f}",
+            "right, %": "{tiles_right:100*.1f}",
+            "us a row": "{step_us_mean:.0f}",
+        },
+    )
+
+
+def own_maps() -> str:
+    return lined(
+        named(read_result("map")["own"], "family"),
+        {
+            "family": "{family}",
+            "runs": "{runs}",
+            "locked, true map": "{locked_true}",
+            "locked, own map": "{locked_own}",
+            "in time": "{in_time}",
+            "rows, true": "{true_rows_median:.0f}",
+            "rows, own": "{own_rows_median:.0f}",
+            "error, true, mm": "{true_error_m_median:1e3*.0f}",
+            "error, own, mm": "{own_error_m_median:1e3*.0f}",
+            "ratio": "{error_ratio_median:.2f}",
+        },
+    )
+
+
+def map_peers() -> str:
+    return lined(
+        [point for point in read_result("map_peers")["points"] if point["mapper"] != "odometry"],
+        {
+            "family": "{world}",
+            "mapper": "{mapper}",
+            "runs": "{runs}",
+            "error, mm": "{error_median_m:1e3*.0f}",
+            "worst, mm": "{error_worst_m:1e3*.0f}",
+            "odometry, mm": "{odometry_error_median_m:1e3*.0f}",
+            "us a row": "{step_us_mean:.0f}",
+        },
+    )
+
+
+def floors() -> str:
+    return lined(
+        named(read_result("floors"), "log", "filter"),
+        {
+            "log": "{log}",
+            "filter": "{filter}",
+            "rows within 6 cm, %": "{near_share:100*.0f}",
+            "median error mm": "{error_median_m:1e3*.0f}",
+            "rows to lock": "{rows_to_lock}",
+            "us/step": "{step_us_mean:.3g}",
+        },
+    )

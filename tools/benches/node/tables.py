@@ -1,0 +1,213 @@
+"""Tables of docs/results/node_faults.md and node_image.md."""
+
+from whisker_protocol import LIMITS
+
+from ..store import read_result
+from ..tables import lined, named, table
+from .image import HANDLERS
+
+FATES = {1: "the old image", 2: "the loader", 4: "the new image"}
+CLASSES = {
+    "FLIP_BIT": "one bit flipped",
+    "FLIP_TWO": "two bits flipped",
+    "NOISY": "each bit flipped with 1/64 to 1/4",
+    "FLOATING": "line floats",
+    "DEAD": "line dead",
+    "STUCK_LOW": "line stuck low",
+    "ERROR_BITS": "error bits set",
+    "LOST_CLOCK": "one clock lost",
+    "EXTRA_CLOCK": "one clock too many",
+    "BEHIND": "frame begun one bit late",
+    "AHEAD": "frame begun one bit early",
+    "OTHER": "supplies, resets, two at once",
+    "CUT": "1 to 64 clocks missing",
+    "GLITCH": "select glitches",
+    "REARMED": "armed anew amid it",
+} | {f"FLIPS_{n}": f"{n} bit{'s' * (n > 1)} flipped" for n in range(1, 9)}
+MHZ = 38.6925  # instructions a microsecond
+
+
+def spread(values: list[int]) -> str:
+    return f"{min(values)}" if min(values) == max(values) else f"{min(values)} to {max(values)}"
+
+
+def faults() -> str:
+    def seen(key: str):
+        def shown(row: dict) -> str:
+            found = sorted({run[key] for run in row["runs"]}, key=lambda text: (len(text), text))
+            return ", ".join(f"`{text}`" for text in found if text)
+
+        return shown
+
+    def reported(row: dict) -> str:
+        first = [run["detected"] for run in row["runs"]]
+        return spread(first) if first[0] >= 0 else "-"
+
+    return lined(
+        read_result("node_faults"),
+        {
+            "Fault": "{fault}",
+            "Expected": "`{expected}`",
+            "Measured": seen("verdicts"),
+            "Reported": reported,
+            "Counted": seen("counted"),
+            "Ticks lost": lambda row: spread([run["lost"] for run in row["runs"]]),
+            "Allowed": "{most}",
+            "Cause of the cost": "{remark}",
+        },
+    )
+
+
+def cuts() -> str:
+    return lined(
+        read_result("node_cuts"),
+        {
+            "Supply fails while": "{step}",
+            "May run then": lambda row: " or ".join(name for fate, name in FATES.items() if row["allowed"] & fate),
+            "Ran": lambda row: ", ".join(FATES[fate] for fate in sorted({run["fate"] for run in row["runs"]})),
+            "Reported": lambda row: "yes" if all(run["reported"] for run in row["runs"]) else "no",
+            "Ticks": lambda row: spread([run["ticks"] for run in row["runs"]]),
+            "Remark": "{remark}",
+        },
+    )
+
+
+def storm() -> str:
+    found = read_result("node")["storm"]
+    what = {
+        "schedules": "schedules of random faults",
+        "ticks": "ticks",
+        "bad": "records flagged",
+        "missed_line": "good samples hurt on the sensor's line that pass start byte, error word, sum and step by arithmetic",
+        "missed_link": "good samples hurt on the link that pass CRC-8 and tick by arithmetic",
+        "displaced": "sound samples read up to 49 us before their tick (see below)",
+        "unexplained": "**hurt and good otherwise: unexplained**",
+        "unforeseen": "bits hurt otherwise than the log foresees",
+        "spurious": "bad records without a fault",
+        "stuck": "nodes that did not come back",
+        "violations": "breaches of a data sheet by the firmware, or words displaced where the log has no arming",
+        "overwritten": "words of the link that its arming displaced amid a transfer at a wrong time, each in a record reported as bad",
+    }
+    return table(["what", "count"], [[text, f"{found[name]:,}".replace(",", " ")] for name, text in what.items()])
+
+
+def passed(way: str) -> str:
+    return lined(
+        named(read_result("node")["storm"][way], "kind"),
+        {
+            {"lines": "sensor's line", "links": "link"}[way]: lambda row: CLASSES[row["kind"]],
+            "events": "{events}",
+            "passes the sum" if way == "lines" else "passes the CRC": "{passed}",
+            "good sample": "{good}",
+        },
+    )
+
+
+def link() -> str:
+    rows = []
+    for divider, gap in read_result("node")["link"]["gap_cycles"].items():
+        cycle = 1e6 / LIMITS["clock_hz"]
+        us = (
+            [f"{gap}", f"{gap * cycle:.2f}", f"{(64 * int(divider) + 3 * gap) * cycle:.1f}"]
+            if gap
+            else ["none", "", ""]
+        )
+        rows.append([divider, f"{LIMITS['clock_hz'] / int(divider) / 1e6:.2f}", *us])
+    return table(["SCK divider", "MHz", "least word gap, cycles of 60 MHz", "us", "record's transfer, us"], rows)
+
+
+def least_period() -> str:
+    found = read_result("node")["link"]["period_cycles"]
+    rows = [[name, str(n), f"{n * 1e6 / LIMITS['clock_hz']:.0f}"] for name, n in found.items()]
+    return table(["link settings", "least tick period that no node misses, cycles", "us"], rows)
+
+
+def skew() -> str:
+    return lined(
+        named(read_result("node")["skew"], "clocks"),
+        {
+            "clocks": "{clocks}",
+            "spread of the sample instants by the nodes, us": "{latch_spread_us_max:.1f}",
+            "with the conversion of the sensor, us": "{true_instant_spread_us_max:.1f}",
+            "oldest angle at the sample, us": "{age_us_max:.1f}",
+            "mean": "{age_us_mean:.1f}",
+        },
+    )
+
+
+def armed() -> str:
+    found = read_result("node")
+    load = found["load"]
+    rows = [
+        [f"SYNC to the armed record, {clocks}: latest, us", f"{us:.0f}"] for clocks, us in found["armed_us_max"].items()
+    ]
+    rows.append(
+        [
+            "interrupts of a tick, each on its longest path, cycles",
+            f"{load['cycles_per_tick']:.0f} of {load['of_cycles_per_tick']}",
+        ]
+    )
+    return table(["what", "value"], rows)
+
+
+def image() -> str:
+    found = read_result("node_image")
+
+    def ran(row: dict, key: str) -> int:
+        return sum(one[key] for one in found["records"] if one["build"] == row["build"])
+
+    return lined(
+        found["cuts"],
+        {
+            "image": "`{build}`",
+            "ticks": lambda row: f"{ran(row, 'ticks'):,}",
+            "records that differ": lambda row: ran(row, "differing"),
+            "updates right": "{right} of {runs}",
+            "ticks until records return, at most": "{ticks_most}",
+        },
+    )
+
+
+def image_sums() -> str:
+    found = read_result("node_image")
+    bad = sum(one["unexplained"] + one["spurious"] + one["stuck"] for one in found["storm"])
+    return table(
+        ["what", "value"],
+        [
+            [
+                "schedules of random faults, resets and traps among them",
+                f"{sum(s['schedules'] for s in found['storm']):,}",
+            ],
+            ["records of these that no check explains, too many or for ever", str(bad)],
+            ["interrupts that left a register, flag, page or count other than they found it", str(found["spoiled"])],
+            ["data and stack, of the memory before the DMA's: at most, bytes", str(found["ram"])],
+            ["reset to the main loop, image check included: at most, cycles", f"{found['boot_cycles']:,}"],
+        ],
+    )
+
+
+def interrupts() -> str:
+    rows = []
+    for name, (irq, what) in HANDLERS.items():
+        h = read_result("node_image")["handlers"][name]
+        cells = (irq, what, h["acts"] or "-", f"{h['least']} to {h['most']}", h["stack"], f"{h['count']:,}")
+        rows.append(list(map(str, cells)))
+    return table(["interrupt", "what it does", "acts, at most", "whole", "stack", "seen"], rows)
+
+
+def by_path() -> str:
+    found = read_result("node_image")["by_path"]
+    rows = [[name, str(cycles), f"{cycles / MHZ:.1f}"] for name, cycles in found.items()]
+    return table(["interrupt", "cycles", "us"], rows)
+
+
+def resets() -> str:
+    return lined(
+        read_result("node_image")["resets"],
+        {
+            "cause": "{cause}",
+            "oscillator": lambda row: "kept" if row["keeps_clock"] else "reset",
+            "MHz after": lambda row: f"{row['hz'][1] / 1e6:.2f}",
+            "lost": "{lost}",
+        },
+    )
