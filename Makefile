@@ -86,17 +86,16 @@ manual: build ## write manual pages and shell completion again, after a change o
 gen: setup ## regenerate protocol/gen from protocol/whisker.toml
 	@$(PYTHON) tools/protogen.py
 
-firmware: ## build the node's firmware with XC16 or XC-DSC, or PIC30=DIR, a public build of the compiler; [SENSOR=..] [RESYNC=1]
+firmware: ## build the node's firmware with XC16 or XC-DSC, or PIC30=DIR, a public build of the compiler
 	@tools/firmware/build.sh
 
-firmware-images: ## make the committed images again, each build twice: PIC30=DIR
+firmware-images: ## make the committed image again, twice: PIC30=DIR
 	@tools/firmware/images.sh
 
-firmware-check: build ## execute the node's images against the firmware's C, at length; or IMAGE=node_wire.hex, built by anyone, [SENSOR=..] [RESYNC=1]
-	@WHISKER_BUILD=$(BUILD) WHISKER_IMAGE_LONG=1 WHISKER_IMAGE="$(abspath $(IMAGE))" \
-		WHISKER_IMAGE_BUILD="$(if $(RESYNC),resync,$(or $(SENSOR),mlx90333))" $(PYTHON) -m pytest --quiet sim/node_image
+firmware-check: build ## execute the node's image against the firmware's C, at length; or IMAGE=node_wire.hex, built by anyone
+	@WHISKER_BUILD=$(BUILD) WHISKER_IMAGE_LONG=1 WHISKER_IMAGE="$(abspath $(IMAGE))" $(PYTHON) -m pytest --quiet sim/node_image
 
-flash: ## first programming of a node by wire, no compiler needed: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [SENSOR=..] [HEX=file]
+flash: ## first programming of a node by wire, no compiler needed: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [HEX=file]
 	@tools/firmware/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")
 
 bitstream: setup ## the bridge for a board one can buy: BOARD=ecpix5|colorlight_i9|colorlight_i5|cynthion|tang_primer_20k|ulx3s [LANES=n] [SEED=n] [SERIAL=text] [USB_ID=vid:pid]

@@ -129,7 +129,7 @@ def main() -> int:
         make_touch(folder)
         make_models(folder)
         make_recording(folder / "drive.mcap")
-        shutil.copyfile(ROOT / "firmware/images/mlx90333/node.whex", folder / "node.whex")
+        shutil.copyfile(ROOT / "firmware/images/node.whex", folder / "node.whex")
         pack(folder, ZIP)
     print(f"{ZIP.relative_to(ROOT)}: {ZIP.stat().st_size / 1e3:.0f} kB")
     return 0

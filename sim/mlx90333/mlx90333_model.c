@@ -32,7 +32,6 @@ void mlx90333_power_on(struct mlx90333 *sensor, uint64_t now_ns, const struct ml
     sensor->t5 = mlx90333_model_stretched(p, MLX90333_T5_NS, 5);
     sensor->t6 = mlx90333_model_stretched(p, MLX90333_T6_NS, 3);
     sensor->t7 = mlx90333_model_stretched(p, MLX90333_T7_NS, 3);
-    sensor->frame_bytes = p->mlx90316 ? MLX90316_FRAME_BYTES : MLX90333_FRAME_BYTES;
     sensor->select_ns = now_ns;
     sensor->random = p->seed;
     sensor->select = true;
@@ -102,18 +101,6 @@ void mlx90333_select(struct mlx90333 *sensor, uint64_t now_ns, bool level)
     sensor->level = true; /* t9: high impedance within 1 us; ones either way until the next clock */
 }
 
-static void mlx90333_model_make_90316_frame(struct mlx90333 *sensor, uint16_t angle, uint16_t errors)
-{
-    const uint16_t data = errors ? (uint16_t)(errors | MLX90316_KIND_ERROR)
-                                 : (uint16_t)((angle & MLX90316_ANGLE_MASK) | MLX90316_KIND_ANGLE);
-    memset(sensor->frame, 0xFF, sizeof sensor->frame);
-    for (unsigned i = 0; i < 2u; i++) {
-        const uint8_t byte = (uint8_t)(data >> (8u - 8u * i));
-        sensor->frame[MLX90316_FRAME_DATA + i] = byte;
-        sensor->frame[MLX90316_FRAME_INVERTED + i] = (uint8_t)~byte;
-    }
-}
-
 static void mlx90333_model_make_frame(struct mlx90333 *sensor, const uint16_t words[3], uint16_t errors)
 {
     uint8_t *frame = sensor->frame;
@@ -136,10 +123,7 @@ static void mlx90333_model_latch(struct mlx90333 *sensor, uint64_t now_ns)
     sensor->age_ns = mlx90333_sense_latch(&sensor->sense, now_ns, words, &errors);
     if (sensor->fault == SIM_SENSOR_ERROR_BITS)
         errors |= sensor->argument;
-    if (sensor->parameters.mlx90316)
-        mlx90333_model_make_90316_frame(sensor, words[0], errors);
-    else
-        mlx90333_model_make_frame(sensor, words, errors);
+    mlx90333_model_make_frame(sensor, words, errors);
     if (errors && sensor->parameters.resets_after_error)
         sensor->reset_due = true; /* once this frame has been sent */
 }
@@ -180,12 +164,11 @@ static void mlx90333_model_clock_rose(struct mlx90333 *sensor, uint64_t now_ns)
 
 static void mlx90333_model_end_byte(struct mlx90333 *sensor, uint64_t now_ns)
 {
-    const uint8_t wanted = sensor->parameters.mlx90316 ? MLX90316_MASTER_START : MLX90333_MASTER_BYTE;
     if (sensor->byte == MLX90333_FRAME_START) {
-        sensor->answering = sensor->received == wanted;
+        sensor->answering = sensor->received == MLX90333_MASTER_START;
         mlx90333_model_latch(sensor, now_ns);
     }
-    sensor->byte = (uint8_t)((sensor->byte + 1u) % sensor->frame_bytes);
+    sensor->byte = (uint8_t)((sensor->byte + 1u) % MLX90333_FRAME_BYTES);
     sensor->bit = 0;
     if (sensor->byte == 0 && sensor->reset_due) { /* soft reset: start-up time again, then a resynchronisation */
         mlx90333_model_start(sensor, now_ns);
@@ -196,8 +179,7 @@ static void mlx90333_model_end_byte(struct mlx90333 *sensor, uint64_t now_ns)
 /* A falling edge samples the line. */
 static void mlx90333_model_clock_fell(struct mlx90333 *sensor, uint64_t now_ns, bool master)
 {
-    const bool may_be_zero = sensor->parameters.mlx90316 && sensor->byte == 0;
-    mlx90333_model_require(sensor, master || may_be_zero, MLX90333_ZERO_SENT);
+    mlx90333_model_require(sensor, master, MLX90333_ZERO_SENT);
     sensor->received = (uint8_t)(sensor->received << 1 | (master && sensor->level));
     sensor->fall_ns = now_ns;
 }

@@ -3,15 +3,13 @@
  * The line is low if either side pulls it low, so master and sensor are a wired AND. The sensor ignores everything
  * until its start-up time has passed, and keeps its count of bits and bytes for ever unless /SS, high long enough,
  * resynchronises it. It also watches its master: every breach of the data sheet is counted, and tests demand zero.
- * What a part may be like, the older MLX90316 included, is in mlx90333_parameters.h; what it measures in
- * mlx90333_sense.h. */
+ * What a part may be like is in mlx90333_parameters.h; what it measures in mlx90333_sense.h. */
 #ifndef MLX90333_MODEL_H
 #define MLX90333_MODEL_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "mlx90316_datasheet.h" // MLX90316_FRAME_BYTES: firmware/dspic/core
 #include "mlx90333_datasheet.h" // times: firmware/dspic/core
 #include "mlx90333_sense.h"     // struct mlx90333_sense, struct mlx90333_field
 #include "sim_counts.h"         // sim_counts
@@ -66,11 +64,10 @@ struct mlx90333 {
     uint8_t received;  /* of the master's byte */
     bool reset_due;    /* after the present frame, which has errors */
     bool restarting;   /* has had such a reset */
-    uint8_t frame_bytes;
-    bool dropping; /* a clock whose rising edge was lost loses its falling edge too */
-    bool dark;     /* without supply */
-    bool slipped;  /* has counted other clocks than its master sent: what seems too soon is not the master's doing */
-    uint8_t frame[MLX90316_FRAME_BYTES];
+    bool dropping;     /* a clock whose rising edge was lost loses its falling edge too */
+    bool dark;         /* without supply */
+    bool slipped; /* has counted other clocks than its master sent: what seems too soon is not the master's doing */
+    uint8_t frame[MLX90333_FRAME_BYTES];
 };
 
 /* Supply on at `now_ns` with /SS high. */

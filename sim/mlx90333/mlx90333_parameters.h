@@ -7,7 +7,6 @@
 
 /* Confidence letters as in the data-sheet header; `?` is not known: try both. */
 struct mlx90333_parameters {
-    bool mlx90316;           /* the older sibling: 10 bytes, one angle (A) */
     bool slow_mode;          /* EEPROM: 7 MHz instead of 20: three times the gaps, five times t5 (C) */
     bool field_mode;         /* EEPROM XYZ: bytes 1 to 6 are X, Y, Z (B) */
     bool sum_without_errors; /* ? the sum covers bytes 1 to 4 only */

@@ -156,9 +156,6 @@ static uint64_t lane_bench_as_read(const struct lane_bench *bench)
 
 static bool lane_bench_is_field(const struct lane_verdict *v, struct sim_field field)
 {
-#ifdef SENSOR_MLX90316
-    field.beta_deg = 0.0; /* It has one angle; the other is at rest. */
-#endif
     return v->alpha == sim_counts(field.alpha_deg) && v->beta == sim_counts(field.beta_deg);
 }
 

@@ -113,7 +113,7 @@ static enum handler sim_node_handler_of(const struct board *board, unsigned irq)
     case IRQ_T2:
         return sim_node_handler_of_t2(sampler);
     case IRQ_SPI1:
-        return sampler->count + 1u < SENSOR_FRAME_BYTES ? HANDLER_BYTE : HANDLER_LAST_BYTE;
+        return sampler->count + 1u < MLX90333_FRAME_BYTES ? HANDLER_BYTE : HANDLER_LAST_BYTE;
     case IRQ_DMA1:
         return board->link_words == SERVICE_WORDS ? HANDLER_SERVICE : HANDLER_ORDER;
     case IRQ_INT2:
@@ -175,9 +175,6 @@ void sim_node_parameters_default(struct sim_node_parameters *parameters, uint64_
     mlx90333_parameters_default(&parameters->sensor);
     parameters->chip.seed = parameters->sensor.seed = seed;
     parameters->sensor.slow_permille = sim_node_oscillator_permille(seed);
-#ifdef SENSOR_MLX90316
-    parameters->sensor.mlx90316 = true;
-#endif
 }
 
 sim_node *sim_node_new_as(const struct sim_node_parameters *parameters)

@@ -12,12 +12,8 @@
 #include "mlx90333_model.h" // enum sim_sensor_fault, sim_counts
 #include "sim_field.h"      // struct sim_field
 
-/* Virtual time from one SYNC to the next: the shortest that this build of the firmware follows. */
-#ifdef SAMPLER_RESYNC_EVERY_FRAME
-#define SIM_TICK_NS UINT64_C(700000) /* 1.43 kHz */
-#else
+/* Virtual time from one SYNC to the next: the shortest that the firmware follows. */
 #define SIM_TICK_NS UINT64_C(500000) /* the paper's 2 kHz */
-#endif
 
 typedef struct sim_node sim_node;
 

@@ -8,12 +8,6 @@
 
 enum { CHECK_TICKS = 1000 };
 
-#ifdef SAMPLER_RESYNC_EVERY_FRAME /* each frame is followed by waits of the board */
-static const bool FRAMES_FOLLOW = false;
-#else
-static const bool FRAMES_FOLLOW = true;
-#endif
-
 bool sim_node_differs(const sim_node *node)
 {
     return node->quick.differs;
@@ -207,9 +201,9 @@ static bool sim_node_record_read(struct sim_node *node)
     quick->last = node->came;
     struct sampler *sampler = &quick->now.sampler;
     memcpy(sampler->frame, frame, sizeof sampler->frame);
-    sampler->count = SENSOR_FRAME_BYTES - 1u;
+    sampler->count = MLX90333_FRAME_BYTES - 1u;
     sampler->state = SAMPLER_BYTE;
-    (void)sampler_on_byte(sampler, frame[SENSOR_FRAME_BYTES - 1u], &quick->now.reading);
+    (void)sampler_on_byte(sampler, frame[MLX90333_FRAME_BYTES - 1u], &quick->now.reading);
     quick->now.tick = order.tick;
     sim_node_record_pack(quick);
     quick->ticks++;
@@ -232,6 +226,6 @@ void sim_node_by_records(sim_node *node, bool allowed)
                                                   sim_node_record_select, sim_node_record_sck,   sim_node_record_run};
     if (node->quick.on)
         sim_node_record_leave(node);
-    node->quick.level = allowed && FRAMES_FOLLOW ? &RECORDS : NULL;
+    node->quick.level = allowed ? &RECORDS : NULL;
     node->quick.until_check = (unsigned)(1u + node->parameters.chip.seed % CHECK_TICKS);
 }

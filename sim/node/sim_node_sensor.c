@@ -58,10 +58,10 @@ static bool sim_node_sensor_edge(struct sim_node *node, bool level, bool sent, u
     return seen;
 }
 
-/* The master sends ones but for the MLX90316's start byte, on a pin of its own beside its input. */
+/* The master's output stays off: whatever else drives its data pin low pulls the line. */
 void sim_node_sensor_clock(struct sim_node *node, bool level, uint64_t now_ns)
 {
-    const bool sent = dspic_output(node->chip, PIN_SENSOR_SEND) != DSPIC_LOW;
+    const bool sent = dspic_output(node->chip, PIN_SENSOR_DATA) != DSPIC_LOW;
     dspic_wire(node->chip, PIN_SENSOR_DATA, sim_node_sensor_edge(node, level, sent, now_ns));
 }
 

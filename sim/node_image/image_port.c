@@ -26,7 +26,7 @@ struct image_board {
         uint16_t board;
         uint8_t state, unready, count, followed;
         uint16_t alpha, beta;
-        uint8_t frame[SENSOR_FRAME_BYTES];
+        uint8_t frame[MLX90333_FRAME_BYTES];
     } sampler;
     struct sensor_reading reading;
     uint8_t tick, numbered, ordered, displaced, begun, serving, armed, unused1;
@@ -189,7 +189,7 @@ static enum image_handler image_port_handler_of(const struct image_board *image,
     case IRQ_T2:
         return image_port_handler_of_t2(image);
     case IRQ_SPI1:
-        return image->sampler.count + 1u < SENSOR_FRAME_BYTES ? IMAGE_BYTE : IMAGE_LAST_BYTE;
+        return image->sampler.count + 1u < MLX90333_FRAME_BYTES ? IMAGE_BYTE : IMAGE_LAST_BYTE;
     case IRQ_SPI1_ERROR:
         return IMAGE_SENSOR_OVERRUN;
     case IRQ_SPI2_ERROR:

@@ -72,7 +72,7 @@ def main() -> int:
     options = parser.parse_args()
     try:
         words = translate.flash_words(options.hex)
-        counted = count(words, options.build_dir / "sim/node_image/mlx90333/image_check")
+        counted = count(words, options.build_dir / "sim/node_image/image_check")
         sys.stdout.write(script(options.hex.resolve(), words, counted))
     except (translate.intel_hex.HexError, OSError, subprocess.CalledProcessError) as error:
         print(f"mdb_table: {error}", file=sys.stderr)

@@ -1,7 +1,7 @@
-"""The node's images, executed, against the firmware's C on the same simulated chip, sensor and link.
+"""The node's image, executed, against the firmware's C on the same simulated chip, sensor and link.
 
-Small runs of the committed images; `make firmware-check` makes the long ones (WHISKER_IMAGE_LONG), of any image
-(WHISKER_IMAGE: its node_wire.hex; WHISKER_IMAGE_BUILD: which of BUILDS it is).
+Small runs of the committed image; `make firmware-check` makes the long ones (WHISKER_IMAGE_LONG), of any image
+(WHISKER_IMAGE: its node_wire.hex).
 """
 
 import json
@@ -21,10 +21,8 @@ import translate  # noqa: E402
 from translate import patches  # noqa: E402
 
 PROGRAMS = ROOT / os.environ.get("WHISKER_BUILD", "build/release") / "sim/node_image"
-COMMITTED = ROOT / "firmware/images"
-BUILDS = ("mlx90333", "mlx90316", "resync")  # of the firmware; the first is the usual one
-FOREIGN = os.environ.get("WHISKER_IMAGE")
-TRIED = (os.environ.get("WHISKER_IMAGE_BUILD", BUILDS[0]),) if FOREIGN else BUILDS
+COMMITTED = ROOT / "firmware/images/node_wire.hex"
+WIRE = Path(os.environ.get("WHISKER_IMAGE") or COMMITTED)
 LONG = "WHISKER_IMAGE_LONG" in os.environ
 TICKS, SEEDS, BOOTS, CUT_SEEDS = (10000, (1, 2, 3), 50, 3) if LONG else (500, (1,), 5, 1)
 IRQS = {"T2": 7, "SPI1 error": 9, "SPI1": 10, "DMA1": 14, "INT1": 20, "INT2": 29, "SPI2 error": 32}
@@ -35,16 +33,16 @@ RESET_POWER = 8
 
 
 class Image:
-    """An image of one of BUILDS: the words of its flash, and the programs that run it."""
+    """The words of an image's flash, and the programs that run it."""
 
-    def __init__(self, build: str, words: list[int], table: Path):
-        self.build, self.words, self.table = build, words, table
+    def __init__(self, words: list[int], table: Path):
+        self.words, self.table = words, table
         table.write_bytes(translate.table_of(words))
 
     def run(self, program: str, *words, costs: Path | None = None) -> subprocess.CompletedProcess:
         names = {"NODE_IMAGE": self.table} | ({"NODE_IMAGE_COSTS": costs} if costs else {})
         environment = os.environ | {name: str(path) for name, path in names.items()}
-        command = [str(PROGRAMS / self.build / program), *map(str, words)]
+        command = [str(PROGRAMS / program), *map(str, words)]
         return subprocess.run(command, env=environment, capture_output=True, text=True)
 
     def measured(self, *words):
@@ -53,20 +51,9 @@ class Image:
         return json.loads(done.stdout)
 
 
-def wire(build: str) -> Path:
-    return Path(FOREIGN or COMMITTED / build / "node_wire.hex")
-
-
-@pytest.fixture(scope="module", params=TRIED)
-def image(request, tmp_path_factory) -> Image:
-    words = translate.flash_words(wire(request.param))
-    return Image(request.param, words, tmp_path_factory.mktemp("image") / "table")
-
-
-def usual(image: Image) -> None:
-    """Skips what a short run asks of the usual build only: the long one asks it of all."""
-    if not LONG and image.build != BUILDS[0]:
-        pytest.skip("of this build in the long run: make firmware-check")
+@pytest.fixture(scope="module")
+def image(tmp_path_factory) -> Image:
+    return Image(translate.flash_words(WIRE), tmp_path_factory.mktemp("image") / "table")
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -98,15 +85,14 @@ def assert_within_the_longest_path(words: list[int], costs: dict) -> None:
 
 @pytest.mark.parametrize("name", patches.patches())
 def test_a_fault_of_the_port_is_noticed(tmp_path, name):
-    words = translate.flash_words(COMMITTED / BUILDS[0] / "node_wire.hex")
-    broken = Image(BUILDS[0], patches.apply(words, name), tmp_path / "broken")
+    words = translate.flash_words(COMMITTED)
+    broken = Image(patches.apply(words, name), tmp_path / "broken")
     wanted, found = broken.run("native_records", 500, 1), broken.run("image_records", 500, 1)
     assert wanted.returncode == 0
     assert found.returncode != 0 or found.stdout != wanted.stdout
 
 
 def test_each_vector_leads_to_its_handler_or_to_a_reset(image):
-    usual(image)
     outcomes = image.measured("image_check", "vectors")
     for program in ("application", "loader"):
         assert {n for n, what in enumerate(outcomes[program]) if what == "returns"} == SERVED
@@ -130,7 +116,6 @@ def test_a_node_is_back_after_every_kind_of_reset_at_its_full_clock(image):
 
 
 def test_the_supply_may_fail_at_each_step_of_an_update(image, tmp_path):
-    usual(image)
     done = image.run("image_cuts", tmp_path / "cuts", CUT_SEEDS)
     assert done.returncode == 0, done.stderr
     steps = json.loads((tmp_path / "cuts").read_text())
@@ -142,7 +127,7 @@ def test_the_supply_may_fail_at_each_step_of_an_update(image, tmp_path):
 
 def test_the_script_for_another_simulator_times_each_interrupt_once():
     """The script only: there is no simulator of the vendor's here."""
-    command = [sys.executable, HERE / "mdb_table.py", wire(TRIED[0]), "--build-dir", PROGRAMS.parents[1]]
+    command = [sys.executable, HERE / "mdb_table.py", WIRE, "--build-dir", PROGRAMS.parents[1]]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
@@ -150,7 +135,7 @@ def test_the_script_for_another_simulator_times_each_interrupt_once():
     reported = [int(line.split(": ")[1].split()[0]) for line in lines if line.startswith("echo")]
     assert len(reported) == len(IRQS) and all(20 < cycles < 2000 for cycles in reported)
     stops = [int(line.split("*")[1], 16) // 2 for line in lines if line.startswith("break")]
-    words = translate.flash_words(wire(TRIED[0]))
+    words = translate.flash_words(WIRE)
     assert set(stops[::2]) == set(paths.handlers(words, IRQS).values())
     assert all(words[at] == 0x064000 for at in stops[1::2])
 
@@ -163,7 +148,5 @@ def test_the_supply_may_fail_at_any_time_of_an_update(image):
 
 @pytest.mark.skipif(not LONG, reason="long: make firmware-check")
 def test_a_thousand_schedules_of_random_faults(image):
-    if image.build != BUILDS[0]:
-        pytest.skip("the storm knows the usual build's sensor and rate")
     done = image.run("image_storm", 0, 1)
     assert done.returncode == 0, done.stdout

@@ -156,7 +156,7 @@ def test_the_data_set_is_small_and_says_whose_it_is():
         assert data.testzip() is None
         assert {name.split("/")[0] for name in data.namelist()} >= {"scene", "surfaces", "contacts.csv", "drive.mcap"}
         image = data.read("node.whex")
-    assert image == (ROOT / "firmware/images/mlx90333/node.whex").read_bytes()
+    assert image == (ROOT / "firmware/images/node.whex").read_bytes()
 
 
 @pytest.fixture(scope="module")

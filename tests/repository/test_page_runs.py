@@ -33,7 +33,7 @@ FILES = {  # what the pages' commands read, by what stands for it
     "scenes/mine": "examples/scene",
     "MODELS/texture.json": "examples/texture.json",
     **{f"{name}{n}.json": "examples/radial.json" for name in ("MODELS/object", "models/object_") for n in (1, 2, 3, 4)},
-    "firmware/images/mlx90333/node.whex": "examples/node.whex",
+    "firmware/images/node.whex": "examples/node.whex",
 }
 LOG, LOG_ROWS = "recordings/random_1", 30  # a Thymio's
 # What a command prints, or FOREVER: it runs until Ctrl-C. In this order: some write what others read.
@@ -54,8 +54,8 @@ ON_FILES = {
     "whisker radial follow lane2.json contacts.csv": "body whisk",
     "whisker radial follow model.json contacts.csv --json": '"motion": "body whisk"',
     "whisker texture classify models/texture.json textures/ROUGH/left_ROUGH1.csv": "ROUGH",
-    "whisker flash firmware/images/mlx90333/node.whex": "no bridge is connected",
-    "whisker flash firmware/images/mlx90333/node.whex --dry-run": "no bridge is connected",
+    "whisker flash firmware/images/node.whex": "no bridge is connected",
+    "whisker flash firmware/images/node.whex --dry-run": "no bridge is connected",
     "whisker scene make --family anchor --seed 500 --steps 3000 --out scenes/500": "scenes/500: anchor, seed 500",
     "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --desktop --units units": "whisker-robot.target; next: ",
     "whisker map scenes/500 --out maps/touch": "faces: ",

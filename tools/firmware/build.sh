@@ -3,38 +3,23 @@
 # With XC16 or XC-DSC on PATH, or PIC30=DIR: a folder with cc1, as, ld, bin2hex, objdump and c30_device.info of a public build of
 # the compiler's sources. Start-up, string functions and linker script are this repository's: nothing of a vendor's library is
 # linked. Not yet run on silicon: the build options say so.
-# Environment: SENSOR (mlx90333, or mlx90316), RESYNC (1: before every frame, for sensors that refuse frames back to back),
-# VERSION (0.1), MDFP (device pack of XC-DSC), OUT (where to).
+# Environment: VERSION (0.1), MDFP (device pack of XC-DSC), OUT (where to).
 set -eu
 cd "$(dirname "$0")/../.."
 LC_ALL=C && export LC_ALL # the order of the sources
 out=${OUT:-build/firmware}
 fw=firmware/dspic
 chip=$fw/port_dspic/chip
-flags=0x8000 defines='' decoder=sensor_frame.c # flags: the image's build options; bit 15: not yet run on silicon
+flags=0x8000 # the image's build options; bit 15: not yet run on silicon
 
 fail() {
     for line in "$@"; do echo "firmware: $line" >&2; done
     exit 1
 }
 
-case ${SENSOR:-mlx90333} in
-    mlx90333) ;;
-    mlx90316) flags=0x8001 defines=-DSENSOR_MLX90316 decoder=sensor_frame_90316.c ;;
-    *) fail "SENSOR=$SENSOR: not known; use mlx90333 or mlx90316" ;;
-esac
-case ${RESYNC:-0} in
-    0) ;;
-    1)
-        [ -z "$defines" ] || fail 'RESYNC=1 is for the MLX90333 only; leave SENSOR out'
-        flags=0x8002 defines=-DSAMPLER_RESYNC_EVERY_FRAME
-        ;;
-    *) fail "RESYNC=$RESYNC: use 1, or leave it out" ;;
-esac
-
 # -fno-builtin: what GCC 4.5.1 makes of memset(.., 0xFF, ..) by itself writes 0xFEFF.
 cflags="-std=gnu99 -O1 -merrata=exch -fno-builtin -Wall -Wextra -Werror -nostdinc -I$chip/libc -I$fw -I$fw/core -I$fw/port_dspic
-    -Iprotocol/gen $defines"
+    -Iprotocol/gen"
 lflags='--stack=16 --check-sections --no-data-init --no-handles --no-isr --report-mem'
 if [ -n "${PIC30:-}" ]; then
     # They look for the list of devices beside themselves, then a folder above, and so on each time they read it.
@@ -46,7 +31,7 @@ if [ -n "${PIC30:-}" ]; then
         ln -sf "$(realpath "$found")" "$tools$name"
     done
     for folder in "$out/pic30" "$out/pic30/bin"; do ln -sf "$(realpath "$tools/c30_device.info")" "$folder/"; done
-    compiled_by=$("${tools}cc1" -version -o /dev/null </dev/null 2>&1 >/dev/null | head -1 | sed 's/ Build date.*//')
+    version=$("${tools}cc1" -version -o /dev/null </dev/null 2>&1 >/dev/null | head -1 | sed 's/ Build date.*//')
     assemble() { "${tools}as" -p33FJ128MC802 -omf=elf --relax "$1" -o "$2"; }
     compile() { # source, object, defines
         # shellcheck disable=SC2086
@@ -60,7 +45,7 @@ else
         'edition will do) and add its bin folder to PATH, or name a public pic30 build with PIC30=DIR.' \
         'No compiler is needed to program a node: make flash takes the images of firmware/images.'
     tools=${compiler%gcc}
-    compiled_by=$("$compiler" --version | head -1)
+    version=$("$compiler" --version | head -1)
     # Newer linkers make vector tables of their own unless they are reported not to.
     if "${tools}ld" --help 2>&1 | grep -q -e --no-ivt; then lflags="$lflags --no-ivt"; fi
     # shellcheck disable=SC2086
@@ -98,13 +83,8 @@ build() { # name, origin, end, define, extra sources
     "${tools}objdump" -d "$out/$name.elf" | sed -e '/file format/d' -e 's/_0x[0-9a-f]*_at_address/_at_address/' >"$out/$name.lst"
 }
 
-core=$fw/core/$decoder # one of the two decoders, and everything else
-for source in $fw/core/*.c; do
-    case $source in
-        */sensor_frame*.c) ;;
-        *) core="$core $source" ;;
-    esac
-done
+core='' # in this order: another makes another image
+for name in sensor_frame crc32 node record sampler service; do core="$core $fw/core/$name.c"; done
 
 rm -rf "$out/loader" "$out/application"
 rm -f "$out"/*.hex "$out"/*.whex "$out"/*.lst
@@ -115,5 +95,20 @@ $python tools/firmware/check_listing.py "$out/application.lst" >"$out/cycles.txt
 $python tools/firmware/make_image.py image "$out/application.hex" "$out/node.whex" --version "${VERSION:-0.1}" --options $flags
 $python tools/firmware/make_image.py wire "$out/loader.hex" "$out/node_wire.hex" --app "$out/application.hex" \
     --version "${VERSION:-0.1}" --options $flags
-echo "$compiled_by" >"$out/compiler.txt"
+
+# Other programs of the same version may choose other registers.
+program() {
+    case $1 in
+        cc1 | as | ld) [ -n "${PIC30:-}" ] || { "$compiler" "-print-prog-name=$1" && return; } ;;
+    esac
+    command -v "$tools$1"
+}
+{
+    echo "version: $version"
+    echo "host: $(uname -sm)"
+    for name in cc1 as ld bin2hex; do
+        path=$(program "$name")
+        if [ -r "$path" ]; then echo "$name: $(sha256sum <"$path" | cut -d ' ' -f 1)"; else echo "$name: not recorded"; fi
+    done
+} >"$out/compiler.txt"
 echo "firmware: $out/node.whex and $out/node_wire.hex, not yet run on silicon; cycles of the sample path in $out/cycles.txt"

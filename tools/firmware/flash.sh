@@ -1,13 +1,11 @@
 #!/bin/sh
 # First programming of a node by wire: loader, application and serial number in one go. No compiler is needed.
 # flash.sh --tool ipecmd|pk2cmd|picberry [--hex WIRE.hex] [--serial N] [--dry-run]
-# Without --hex the committed image for SENSOR (mlx90333, mlx90316) or RESYNC=1; `make firmware` makes one of your own.
+# Without --hex the committed image; `make firmware` makes one of your own.
 # Environment besides: IPECMD_TOOL (PPK3: a PICkit 3), PICBERRY_FAMILY (dspic33f), PICBERRY_PINS.
 set -eu
 cd "$(dirname "$0")/../.."
-sensor=${SENSOR:-mlx90333}
-[ "${RESYNC:-0}" = 0 ] || sensor=resync
-tool='' hex=firmware/images/$sensor/node_wire.hex serial='' dry_run=''
+tool='' hex=firmware/images/node_wire.hex serial='' dry_run=''
 
 fail() {
     echo "flash: $1" >&2
@@ -45,7 +43,7 @@ for name in $places; do
 done
 [ -n "$program" ] || [ -n "$dry_run" ] || fail "$tool: not found on PATH; install $from"
 [ -n "$program" ] || program=$tool
-[ -r "$hex" ] || fail "$hex: not there; give SENSOR=mlx90333 or mlx90316, or RESYNC=1, or a file of make firmware with HEX=FILE"
+[ -r "$hex" ] || fail "$hex: not there; give a file of make firmware with HEX=FILE"
 .venv/bin/python tools/firmware/make_image.py check "$hex" || exit 1
 
 mkdir -p build/firmware

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints the SHA-256 of the firmware's sources as the chip's compiler sees them: without comments, white space and unused macros.
 
-firmware/images/SOURCES holds that of the committed images, so that a test shows when the sources have changed since.
+firmware/images/SOURCES holds that of the committed image, so that a test shows when the sources have changed since.
 """
 
 import hashlib
@@ -12,7 +12,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware/dspic"
 CHIP = FIRMWARE / "port_dspic/chip"
-BUILDS = ((), ("SENSOR_MLX90316",), ("SAMPLER_RESYNC_EVERY_FRAME",))
 PROGRAMS = ((), ("NODE_LOADER",))
 
 
@@ -38,7 +37,7 @@ def source_hash() -> str:
     for source in sorted(
         path for folder in ("core", "boot", "port_dspic", "port_dspic/chip") for path in FIRMWARE.glob(f"{folder}/*.c")
     ):
-        texts += [preprocessed(source, build + program) for build in BUILDS for program in PROGRAMS]
+        texts += [preprocessed(source, program) for program in PROGRAMS]
     return hashlib.sha256(re.sub(r"\s+", " ", " ".join(texts)).encode()).hexdigest()
 
 

@@ -6,22 +6,10 @@
 /* Waits, in microseconds. Each exceeds the data sheet's time by the sensor's slowest oscillator and our own fastest
  * (FRC: 2 %); checked below. */
 #define STARTUP_US 18000u
-#ifdef SAMPLER_RESYNC_EVERY_FRAME /* as short as they may be: 629 us of the tick's 700; the interrupts' work on top */
-#define RESYNC_US 337u
-#define SELECT_US 3u
-#define START_GAP_US 17u
-#define GAP_US 14u
-#elif defined SENSOR_MLX90316 /* ten bytes: a frame in 384 us of the tick's 500; the interrupts' work on top */
-#define RESYNC_US 350u
-#define SELECT_US 4u
-#define START_GAP_US 18u
-#define GAP_US 16u
-#else
 #define RESYNC_US 350u
 #define SELECT_US 4u
 #define START_GAP_US 24u /* with a byte's 21 us: slots of 45 us, a frame in 336 us of the tick's 500 */
 #define GAP_US START_GAP_US
-#endif
 #define RELEASE_US 30u /* from a SYNC that may find a byte under way */
 #define RAISE_US 4u    /* from the last byte */
 
@@ -47,7 +35,7 @@ static void sampler_wait_in(struct sampler *sampler, enum sampler_state state, u
 static void sampler_transfer_byte(struct sampler *sampler)
 {
     sampler->state = SAMPLER_BYTE;
-    board_sensor_transfer(sampler->board, sampler->count == 0 ? SENSOR_MASTER_START : MLX90333_MASTER_BYTE);
+    board_sensor_transfer(sampler->board, sampler->count == 0 ? MLX90333_MASTER_START : MLX90333_MASTER_BYTE);
 }
 
 void sampler_start(struct sampler *sampler, struct board *board, uint8_t unready)
@@ -131,21 +119,16 @@ static bool sampler_is_good(const struct sensor_reading *reading)
 
 static void sampler_end_frame(struct sampler *sampler, struct sensor_reading *reading)
 {
-#ifdef SAMPLER_RESYNC_EVERY_FRAME
-    sampler_wait_in(sampler, SAMPLER_RELEASE, RAISE_US); /* first: there is no time to wait for the decoding */
-#endif
     *reading = sensor_frame_decode(sampler->frame);
     if (sampler_is_good(reading))
         sampler_doubt(sampler, reading);
     sampler->followed = reading->status == 0; /* angles beside an error word are no measure for the next ones */
     sampler->alpha = reading->alpha;
     sampler->beta = reading->beta;
-#ifndef SAMPLER_RESYNC_EVERY_FRAME
     if (sampler_is_good(reading))
         sampler->state = SAMPLER_READY;
     else
         sampler_wait_in(sampler, SAMPLER_RELEASE, RAISE_US);
-#endif
 }
 
 bool sampler_on_byte(struct sampler *sampler, uint8_t byte, struct sensor_reading *reading)
@@ -153,7 +136,7 @@ bool sampler_on_byte(struct sampler *sampler, uint8_t byte, struct sensor_readin
     if (sampler->state != SAMPLER_BYTE)
         return false;
     sampler->frame[sampler->count++] = byte;
-    if (sampler->count < SENSOR_FRAME_BYTES) {
+    if (sampler->count < MLX90333_FRAME_BYTES) {
         sampler_wait_in(sampler, SAMPLER_GAP, sampler->count == 1u ? START_GAP_US : GAP_US);
         return false;
     }

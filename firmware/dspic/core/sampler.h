@@ -6,9 +6,7 @@
  *                            +----------- RELEASE <---- SYNC before the end (late), or bad frame ----+
  *
  * Frames follow each other without a resynchronisation (/SS stays low), else 2 kHz would not fit: only power-up, a bad
- * frame and a late one raise /SS for t5, which overlaps the next SYNC and so costs that tick. Should real sensors
- * refuse frames back to back, a build with -DSAMPLER_RESYNC_EVERY_FRAME raises /SS after every one; it follows 1.43 kHz
- * (docs/hardware.md).
+ * frame and a late one raise /SS for t5, which overlaps the next SYNC and so costs that tick.
  *
  * A frame that slipped by a bit passes its sum about one time in eight, for all its bytes are halved or doubled, and so
  * is their sum (docs/results/node_faults.md): an angle that jumps further than a whisker can move in a tick is not
@@ -43,7 +41,7 @@ struct sampler {
     uint8_t count;        /* bytes of the frame received */
     bool followed;        /* the next good frame has one right before it */
     uint16_t alpha, beta; /* of that frame */
-    uint8_t frame[SENSOR_FRAME_BYTES];
+    uint8_t frame[MLX90333_FRAME_BYTES];
 };
 
 /* Begins the start-up wait. Call once, at reset. `unready`: the code of ticks until the sensor is ready,

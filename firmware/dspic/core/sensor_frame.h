@@ -1,12 +1,11 @@
-/* Decoder of the sensor's frame: pure, no state. sensor_frame.c reads the MLX90333, sensor_frame_90316.c the MLX90316.
- */
+/* Decoder of the sensor's frame: pure, no state. */
 #ifndef SENSOR_FRAME_H
 #define SENSOR_FRAME_H
 
 #include <stdint.h>
 
-#include "sensor.h"           // SENSOR_FRAME_BYTES
-#include "whisker_protocol.h" // WHISKER_STATUS_CODE_SHIFT
+#include "mlx90333_datasheet.h" // MLX90333_FRAME_BYTES
+#include "whisker_protocol.h"   // WHISKER_STATUS_CODE_SHIFT
 
 /* One reading of the sensor as a record carries it. */
 struct sensor_reading {
@@ -22,16 +21,13 @@ static inline struct sensor_reading sensor_reading_of_code(uint8_t code)
     return reading;
 }
 
-/* Reading in a frame of SENSOR_FRAME_BYTES.
+/* Reading in a frame.
  *
- * MLX90333: all ones is a sensor that does not answer, a wrong first byte a line
- * stuck low (all zeros has the right sum: both checks are needed). The sum covers bytes 1 to 6. Whether the error word
- * is part of it is not confirmed, so with errors set a sum over bytes 1 to 4 passes too. A bit that is not assigned is
- * a flipped one: no frame with such a bit passes, else it and a flip in the data could make up for each other.
- *
- * MLX90316: one angle, which becomes alpha; beta is at rest. The data must equal its inverted copy; the first byte on
- * the shared line is the master's own. */
-struct sensor_reading sensor_frame_decode(const uint8_t frame[SENSOR_FRAME_BYTES]);
+ * All ones is a sensor that does not answer, a wrong first byte a line stuck low (all zeros has the right sum: both
+ * checks are needed). The sum covers bytes 1 to 6. Whether the error word is part of it is not confirmed, so with
+ * errors set a sum over bytes 1 to 4 passes too. A bit that is not assigned is a flipped one: no frame with such a bit
+ * passes, else it and a flip in the data could make up for each other. */
+struct sensor_reading sensor_frame_decode(const uint8_t frame[MLX90333_FRAME_BYTES]);
 
 /* The assigned bits of the sensor's 16-bit error word as WHISKER_ERROR_* bits 9..0. */
 uint16_t sensor_frame_errors(uint16_t word);

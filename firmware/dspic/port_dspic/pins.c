@@ -9,7 +9,7 @@
 
 void pins_start(struct board *board)
 {
-    const uint16_t open_drain = BIT(PIN_SENSOR_SELECT) | BIT(PIN_SENSOR_CLOCK) | BIT(PIN_SENSOR_SEND);
+    const uint16_t open_drain = BIT(PIN_SENSOR_SELECT) | BIT(PIN_SENSOR_CLOCK) | BIT(PIN_SPARE);
     sfr_write(board, AD1PCFGL, 0xFFFFu); /* pins start as analogue inputs, which read 0 */
     sfr_set(board, LATB, BIT(PIN_SENSOR_SELECT));
     sfr_set(board, ODCB, open_drain); /* the sensor lives at 5 V */
@@ -19,10 +19,6 @@ void pins_start(struct board *board)
     sfr_write(board, RPINR22, PIN_LINK_MOSI | HIGH_FIELD(PIN_LINK_CLOCK));
     sfr_write(board, RPINR23, PIN_LINK_SELECT);
     sfr_write(board, RPINR1, PIN_LINK_SELECT); /* the end of a transfer, by its rising edge */
-#ifdef SENSOR_MLX90316
-    sfr_clear(board, TRISB, BIT(PIN_SENSOR_SEND));
-    sfr_set(board, OUTPUT_REGISTER(PIN_SENSOR_SEND), OUTPUT(PIN_SENSOR_SEND, RP_SDO1));
-#endif
     sfr_set(board, OUTPUT_REGISTER(PIN_SENSOR_CLOCK), OUTPUT(PIN_SENSOR_CLOCK, RP_SCK1));
     sfr_set(board, OUTPUT_REGISTER(PIN_LINK_MISO), OUTPUT(PIN_LINK_MISO, RP_SDO2));
     cpu_write_osccon_low(board, OSCCON_IOLOCK);

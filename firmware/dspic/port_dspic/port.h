@@ -13,7 +13,7 @@
 #include "chip_board.h"
 
 /* Pins, as numbers of port B and of RP. Sensor lines are open drain on 5 V tolerant pins. docs/hardware.md */
-#define PIN_SENSOR_SEND 6u /* MLX90316 only: tied to PIN_SENSOR_DATA */
+#define PIN_SPARE 6u /* an input, left open */
 #define PIN_SENSOR_SELECT 7u
 #define PIN_SENSOR_CLOCK 8u
 #define PIN_SENSOR_DATA 9u

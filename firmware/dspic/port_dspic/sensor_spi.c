@@ -6,13 +6,8 @@
 #include "sfr.h"
 
 /* FCY / (16 * 7) = 345 kHz: a bit takes 2.9 us, 2.84 on an oscillator 2 % fast, and a sensor 10 % slow wants 2.53.
- * The MLX90333 is only ever sent ones: the output stays off and the pull-up sends them. */
-#ifdef SENSOR_MLX90316
-#define SENSOR_SENDS 0u
-#else
-#define SENSOR_SENDS SPICON1_DISSDO
-#endif
-#define SENSOR_CON1 (SPICON1_MSTEN | SENSOR_SENDS | 1u << SPICON1_PPRE_SHIFT | 1u << SPICON1_SPRE_SHIFT)
+ * The sensor is only ever sent ones: the output stays off and the pull-up sends them. */
+#define SENSOR_CON1 (SPICON1_MSTEN | SPICON1_DISSDO | 1u << SPICON1_PPRE_SHIFT | 1u << SPICON1_SPRE_SHIFT)
 
 /* Counts of T2 per microsecond at FCY 38.69 MHz, rounded up: 4.836 at 1:8 and 0.6045 at 1:64. */
 #define SHORT_MOST_US 8000u

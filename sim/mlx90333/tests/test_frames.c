@@ -1,4 +1,4 @@
-/* What a frame holds, by family and mode. */
+/* What a frame holds, by mode. */
 #include "bench.h"
 
 static void a_legal_master_reads_frame_after_frame(void **state)
@@ -86,57 +86,16 @@ static void the_sum_may_leave_the_error_word_out(void **state)
     assert_int_equal(frame[7], (uint8_t)(frame[1] + frame[2] + frame[3] + frame[4]));
 }
 
-static void the_older_sensor_wants_its_key_and_sends_data_twice(void **state)
+static void a_frame_is_eight_bytes(void **state)
 {
     (void)state;
-    struct mlx90333_parameters p = standard();
-    p.mlx90316 = true;
     struct bench bench;
-    uint8_t frame[10];
-    for (unsigned key = 0; key < 2; key++) {
-        wake_as(&bench, &p);
-        for (unsigned i = 0; i < 10; i++) {
-            frame[i] = clock_bits(&bench, i == 0 && key ? 0xAA : 0xFF, 8);
-            bench.now += i == 0 ? bench.start_gap : bench.gap;
-        }
-        assert_int_equal(frame[2] << 8 | frame[3], key ? 0x8001 : 0xFFFF);
-        assert_int_equal(frame[4] << 8 | frame[5], key ? 0x7FFE : 0xFFFF);
-        assert_int_equal(frame[0], key ? 0xAA : 0xFF); /* the wired AND shows the master its own byte */
-        assert_int_equal(mlx90333_violations(&bench.sensor), 0);
-    }
-}
-
-static void a_frame_is_eight_bytes_or_ten(void **state)
-{
-    (void)state;
-    for (unsigned old = 0; old < 2; old++) {
-        struct mlx90333_parameters p = standard();
-        p.mlx90316 = old;
-        struct bench bench;
-        wake_as(&bench, &p);
-        for (unsigned i = 1; i <= 20; i++) {
-            clock_bits(&bench, old && bench.sensor.byte == 0 ? 0xAA : 0xFF, 8);
-            assert_int_equal(bench.sensor.byte, i % (old ? 10u : 8u));
-            bench.now += bench.start_gap;
-        }
-    }
-}
-
-static void the_older_sensors_error_word_takes_the_angles_place(void **state)
-{
-    (void)state;
-    struct mlx90333_parameters p = standard();
-    p.mlx90316 = true;
-    struct bench bench;
-    uint8_t frame[10];
-    wake_as(&bench, &p);
-    mlx90333_set_fault(&bench.sensor, SIM_SENSOR_ERROR_BITS, 0x0024);
-    for (unsigned i = 0; i < 10; i++) {
-        frame[i] = clock_bits(&bench, i == 0 ? 0xAA : 0xFF, 8);
+    wake(&bench, 1);
+    for (unsigned i = 1; i <= 20; i++) {
+        clock_bits(&bench, 0xFF, 8);
+        assert_int_equal(bench.sensor.byte, i % 8u);
         bench.now += bench.start_gap;
     }
-    assert_int_equal(frame[2] << 8 | frame[3], 0x0024 | 2);
-    assert_int_equal((frame[2] << 8 | frame[3]) ^ (frame[4] << 8 | frame[5]), 0xFFFF);
 }
 
 static void a_strong_field_saturates_its_word(void **state)
@@ -163,9 +122,7 @@ int main(void)
         cmocka_unit_test(a_wrong_start_byte_gets_no_answer),
         cmocka_unit_test(field_mode_sends_the_vector),
         cmocka_unit_test(the_sum_may_leave_the_error_word_out),
-        cmocka_unit_test(the_older_sensor_wants_its_key_and_sends_data_twice),
-        cmocka_unit_test(a_frame_is_eight_bytes_or_ten),
-        cmocka_unit_test(the_older_sensors_error_word_takes_the_angles_place),
+        cmocka_unit_test(a_frame_is_eight_bytes),
         cmocka_unit_test(a_strong_field_saturates_its_word),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,4 +1,4 @@
-"""The node's images, executed: records and power cuts of each build; of the usual one cycles, stack and resets too.
+"""The node's image, executed: records, power cuts, cycles, stack, resets.
 
 .venv/bin/python tools/benches image    bench/results/node_image.json
 """
@@ -13,8 +13,7 @@ from pathlib import Path
 from .. import store
 
 ROOT = Path(__file__).resolve().parents[3]
-IMAGES = ROOT / "firmware/images"
-BUILDS = ("mlx90333", "mlx90316", "resync")  # of the firmware; the first is the usual one
+IMAGE = ROOT / "firmware/images/node_wire.hex"
 sys.path.insert(0, str(ROOT / "sim/node_image"))
 import paths  # noqa: E402
 import translate  # noqa: E402
@@ -39,12 +38,12 @@ HANDLERS = {  # as image_port.h names them: the interrupt, and what it is for
 
 
 class Node:
-    """Programs with one build's image in them; what its interrupts cost, over all runs."""
+    """Programs with the image in them; what its interrupts cost, over all runs."""
 
-    def __init__(self, name: str, build: Path, folder: Path):
-        self.name, self.programs, self.folder = name, build / "sim/node_image" / name, folder
-        self.words = translate.flash_words(IMAGES / name / "node_wire.hex")
-        self.table = folder / name
+    def __init__(self, build: Path, folder: Path):
+        self.programs, self.folder = build / "sim/node_image", folder
+        self.words = translate.flash_words(IMAGE)
+        self.table = folder / "table"
         self.table.write_bytes(translate.table_of(self.words))
         self.costs: list[dict] = []
 
@@ -83,7 +82,7 @@ def records(node: Node) -> list[dict]:
         found = node.run("image_records", TICKS, seed).splitlines()
         differing = sum(a != b for a, b in zip(wanted, found, strict=True))
         good = sum(line.endswith(" good") for line in found)
-        out.append({"build": node.name, "seed": seed, "ticks": TICKS, "good": good, "differing": differing})
+        out.append({"seed": seed, "ticks": TICKS, "good": good, "differing": differing})
     return out
 
 
@@ -92,16 +91,15 @@ def cuts(node: Node) -> dict:
     node.run("image_cuts", path)
     runs = [(step, one) for step in json.loads(path.read_text()) for one in step["runs"]]
     right = sum(one["reported"] and one["again"] and bool(one["fate"] & step["allowed"]) for step, one in runs)
-    return {"build": node.name, "runs": len(runs), "right": right, "ticks_most": max(one["ticks"] for _, one in runs)}
+    return {"runs": len(runs), "right": right, "ticks_most": max(one["ticks"] for _, one in runs)}
 
 
 def run(build: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        nodes = [Node(name, build, Path(folder)) for name in BUILDS]
-        node = nodes[0]
+        node = Node(build, Path(folder))
         result = {
-            "records": [one for each in nodes for one in records(each)],
-            "cuts": [cuts(each) for each in nodes],
+            "records": records(node),
+            "cuts": cuts(node),
             "resets": json.loads(node.run("image_check", "resets")),
         }
         result["storm"] = [json.loads(line) for line in node.run("image_storm", 0, 2).splitlines()]
@@ -111,5 +109,5 @@ def run(build: Path) -> None:
         result |= {"handlers": node.handlers(), "by_path": node.by_path()}
         result["ram"] = max(c["ram"] for c in node.costs)
         result["boot_cycles"] = max(c["boot_cycles"] for c in node.costs)
-        result["spoiled"] = sum(c["spoiled"] for each in nodes for c in each.costs)
+        result["spoiled"] = sum(c["spoiled"] for c in node.costs)
     store.write_result("node_image", result)

@@ -151,17 +151,12 @@ def armed() -> str:
 
 
 def image() -> str:
-    found = read_result("node_image")
-
-    def ran(row: dict, key: str) -> int:
-        return sum(one[key] for one in found["records"] if one["build"] == row["build"])
-
+    records = read_result("node_image")["records"]
     return lined(
-        found["cuts"],
+        [read_result("node_image")["cuts"]],
         {
-            "image": "`{build}`",
-            "ticks": lambda row: f"{ran(row, 'ticks'):,}",
-            "records that differ": lambda row: ran(row, "differing"),
+            "ticks": lambda row: f"{sum(one['ticks'] for one in records):,}",
+            "records that differ": lambda row: sum(one["differing"] for one in records),
             "updates right": "{right} of {runs}",
             "ticks until records return, at most": "{ticks_most}",
         },
