@@ -51,7 +51,6 @@ ROUND = {
     "nav_peers": ["--seeds", "5"],
     "nav_unseen": ["--seeds", "10"],
     "ring": ["--rounds", "1"],
-    "robot": ["--levels", "0", "1", "2"],
     "usb": ["--frames", "500000"],
 }
 

@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from . import store
-from .front.tables import HEADLINES
 
 FRONT = Path(__file__).resolve().parent
 FRESH = "--fresh"
@@ -81,18 +80,12 @@ def measure(topic: str, words: list[str]) -> dict:
 
 
 def line(report: dict, was_kept: bool) -> str:
-    """One topic's summary: time, the headline of what it measured, what was left out and why."""
+    """One topic's summary: time, its results, what was left out and why."""
     time_ = "kept" if was_kept else f"{report['wall_s'] / 60:.1f} min, {report['cpu_s'] / 60:.1f} of processor"
     if report["error"]:
         return f"FAILED after {time_}: {report['error']}"
-    said = [f"{one.title}: {one.value(store.read_result(one.result))} {one.unit}".strip() for one in headlines(report)]
-    said += said or [", ".join(report["results"])]
     left = [f"left out: {name} ({error})" for name, error in report["left_out"].items()]
-    return "; ".join([time_, *said[:1], *left])
-
-
-def headlines(report: dict) -> list:
-    return [one for one in HEADLINES if one.result in report["results"]]
+    return "; ".join([time_, ", ".join(report["results"]), *left])
 
 
 def origins() -> str:

@@ -42,7 +42,7 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tools/benches radial": (("radial",), ("radial_fig5",)),
     "tools/benches record": (("record",), ()),
     "tools/benches ring": (("ring",), ()),
-    "tools/benches robot": (("robot_levels", "robot_long"), ("robot_long",)),
+    "tools/benches robot": (("robot_long",), ("robot_long",)),
     "tools/benches texture": (("texture",), ()),
     "tools/benches timing": (("bridge_timing",), ()),
     "tools/benches usb": (("usb_soak",), ()),

@@ -24,6 +24,14 @@ Cell = str | Callable[[dict], object]
 class Cells(Formatter):
     """Fields `{error_m:1e3*.1f}`, a scale before a format: 12.3 of 0.0123. Of a field that is None the cell is NONE."""
 
+    def get_field(self, field_name: str, args, kwargs):
+        """As str.format's, but a number in brackets may be a key that is text."""
+        name, *keys = field_name.replace("]", "").split("[")
+        value = kwargs[name]
+        for key in keys:
+            value = value[int(key)] if isinstance(value, list) else value[key]
+        return value, name
+
     def format_field(self, value, spec: str) -> str:
         if value is None:
             raise TypeError("no value")

@@ -8,7 +8,7 @@ import numpy as np
 
 from crunchbot.touch.contact_filter import ContactFilter
 
-from .scenes import FRICTION_SD, QUARTER, REACH_M, TICK_S, TIP, Corner, Draw, Plan, Scene, chained, lying, simulated
+from .scenes import FRICTION_SD, QUARTER, REACH_M, TICK_S, TIP, Corner, Draw, Plan, Scene, chained, lying
 
 FIRST_S = 0.1  # figures count from here on: the contact has moved by a centimetre at 0.1 m/s
 NINETY_2, NINETY_1 = 4.605, 2.706  # chi-squared, 90 %, of two and of one degree of freedom
@@ -64,31 +64,6 @@ def head_on(rng) -> Plan:
     return Plan(straight(600, rng.uniform(0.05, SPEED), normal - QUARTER), standing(600), TIP, FLAT_M, normal)
 
 
-def any_speed(rng) -> tuple[float, int]:
-    """A speed from 0.03 to 0.2 m/s and the ticks in which 50 mm are driven."""
-    speed = 0.03 * (0.2 / 0.03) ** rng.uniform()
-    return speed, int(np.clip(0.05 / speed / TICK_S, 500, 2000))
-
-
-def any_face(rng) -> Plan:
-    normal, (speed, ticks) = rng.uniform(np.radians(97), np.radians(135)), any_speed(rng)
-    bases = straight(ticks, speed, rng.uniform(-0.3, 0.3) + normal - QUARTER)
-    return Plan(bases, standing(ticks), TIP, FLAT_M, normal)
-
-
-def any_cylinder(rng) -> Plan:
-    (speed, ticks), radius_m = any_speed(rng), rng.uniform(0.03, 0.15)
-    bases = straight(ticks, speed, 0.0)
-    if rng.uniform() < 0.5:
-        return Plan(bases, standing(ticks), rng.uniform(0.08, 0.13), radius_m)
-    return Plan(bases, standing(ticks), TIP, radius_m, rng.uniform(np.radians(97), np.radians(118)))
-
-
-def any_corner(rng) -> Plan:
-    speed, ticks = any_speed(rng)
-    return Plan(straight(ticks, speed, rng.uniform(-0.4, 0.4)), standing(ticks), rng.uniform(0.07, 0.125))
-
-
 def moving(rng, still: bool = False) -> Plan:
     """An object that moves; the base stands, then retreats from it or, `still`, goes on standing."""
     ticks, speed, angle = 700, rng.uniform(0.03, 0.1), rng.uniform(-0.4, 0.4)
@@ -130,41 +105,29 @@ KINDS = {
     "face, then lying along it": lambda rng: face(rng)._replace(lies=True),
     "face, head-on": head_on,
 }
-ANY = {"corner, drive": any_corner, "face, drive": any_face, "cylinder, drive": any_cylinder}
 CHAINED = [kind for kind in KINDS if not kind.startswith("moving")]
-ANY_FIRST, WHISKED_FIRST = 100_000, 200_000  # seeds
+WHISKED_FIRST = 200_000  # seed
 
 
 class Case(NamedTuple):
     """What the filter is given, and what bends the whisker."""
 
     kinds: dict[str, Callable]
-    friction_known: bool = False
     links: bool = False
-    frictions: tuple[float, float] | None = None  # drawn between them; None: about the mean
 
     @property
     def settings(self) -> dict[str, float]:
         """Of the filter."""
-        spread = (self.frictions[1] - self.frictions[0]) / np.sqrt(12) if self.frictions else FRICTION_SD
-        return {"friction_sd": 0.0 if self.friction_known else spread} | ({"creep": 0.0} if self.links else {})
+        return {"friction_sd": FRICTION_SD} | ({"creep": 0.0} if self.links else {})
 
     def drawn(self, kind: str, seed: int) -> tuple[Plan, Draw]:
-        number = 1000 * list(KINDS).index(kind) + seed
-        if self.frictions is None:
-            draw = Draw.of(number, self.friction_known)
-            return self.kinds[kind](draw.rng), draw
-        draw = Draw.of(ANY_FIRST + number)
-        draw = draw._replace(friction=draw.rng.uniform(*self.frictions))
+        draw = Draw.of(1000 * list(KINDS).index(kind) + seed)
         return self.kinds[kind](draw.rng), draw
 
 
-SIMULATED = {kind: plan for kind, plan in KINDS.items() if not kind.startswith("face,") or kind == "face, drive"}
 CASES = {
-    "known": Case(SIMULATED, friction_known=True),
-    "unknown": Case(SIMULATED),
+    "simulated": Case({kind: plan for kind, plan in KINDS.items() if "corner" in kind}),
     "chain": Case({kind: KINDS[kind] for kind in CHAINED}, links=True),
-    "any": Case(ANY, links=True, frictions=(0.1, 0.5)),
 }
 
 
@@ -177,9 +140,9 @@ def contacts(case: Case, kind: str, count: int) -> Iterator[tuple[Scene, np.ndar
     for seed in range(count):
         plan, draw = case.drawn(kind, seed)
         least = None
-        if plan.round_m == 0.0 and not case.links:
+        if not case.links:
             least = Corner(plan).bound(draw, case.settings["friction_sd"])
-        made = (chained if case.links else simulated)(plan, draw)
+        made = chained(plan, draw) if case.links else Corner(plan).scene(draw)
         if made is not None and len(made.tilt) > 1.2 * FIRST_S / TICK_S:
             yield made, least
 

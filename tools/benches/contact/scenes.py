@@ -1,5 +1,5 @@
-"""Contacts whose truth is known: corners by sim/mechanics with vibration, surfaces by its elastica, quasi-static; all
-by a chain of links in MuJoCo.
+"""Contacts whose truth is known: corners by sim/mechanics with vibration; corners and surfaces by a chain of links in
+MuJoCo.
 
 A scene gives, for every tick of 0.5 ms from the first touch on: the base's motion as reported, the measured tilt of the
 plug in two axes, and the truth in the whisker's frame.
@@ -49,9 +49,9 @@ class Draw(NamedTuple):
     rng: np.random.Generator
 
     @classmethod
-    def of(cls, seed: int, known_friction: bool = False) -> "Draw":
+    def of(cls, seed: int) -> "Draw":
         rng = np.random.default_rng(seed)
-        friction = FRICTION if known_friction else float(np.clip(FRICTION + FRICTION_SD * rng.normal(), 0.05, 0.5))
+        friction = float(np.clip(FRICTION + FRICTION_SD * rng.normal(), 0.05, 0.5))
         return cls(GAIN_SD * rng.normal(), friction, MOTION_SD * rng.normal(), rng)
 
     def measured(self, tilt: np.ndarray) -> np.ndarray:
@@ -170,104 +170,6 @@ class Corner(NamedTuple):
         least = np.linalg.pinv(information[EVERY:], hermitian=True)
         traces = np.einsum("nik,nkl,nil->n", places[EVERY:], least, places[EVERY:])
         return 1e3 * np.sqrt(np.concatenate([np.full(EVERY, np.nan), traces]))
-
-
-class Surface:
-    """A whisker that slides over a circle (a face: of 5 m), solved by the simulator's elastica."""
-
-    def __init__(self, radius_m: float, friction: float, tip: bool, first: float):
-        from crunchbot_lab.signals._sim import lib
-
-        self._bend = lib.mech_elastica_bend
-        self._radius, self._friction = radius_m / CONE, friction
-        self._out = 1.0  # +1: the contact moves outwards over the surface faster than along the whisker
-        self.tip, self._unknown = tip, np.array([first, 1e-3])
-        self._last = None
-
-    def _look(self, unknown: np.ndarray, creep: float) -> tuple[np.ndarray, float, float]:
-        """Place of the contact, direction of the surface's normal, elastic tilt. Unknown: force's ratio or arc;
-        force."""
-        first, force = unknown
-        arc, ratio = (TIP / CONE, first) if self.tip else (first, -self._out * self._friction)
-        bend = self._bend(arc, force, ratio, 48)
-        tilt = bend.moment / (3 * KAPPA)
-        angle, normal = bend.theta + tilt + creep, bend.slope + tilt + creep + QUARTER
-        if self.tip:
-            normal -= np.arctan(first) + self._out * np.arctan(self._friction)
-        return bend.x * np.array([np.cos(angle), np.sin(angle)]), normal, tilt
-
-    def _left(self, unknown: np.ndarray, creep: float, centre: np.ndarray) -> np.ndarray:
-        place, normal, _ = self._look(unknown, creep)
-        return place - self._radius * np.array([np.cos(normal), np.sin(normal)]) - centre
-
-    def _newton(self, centre: np.ndarray, creep: float) -> np.ndarray | None:
-        unknown = self._unknown
-        for _ in range(60):
-            left = self._left(unknown, creep, centre)
-            if np.abs(left).max() < 1e-8 * max(1.0, self._radius):
-                return unknown if unknown[1] > 0 else None
-            steps = np.diag(1e-6 * np.maximum(np.abs(unknown), 1e-2))
-            slopes = [(self._left(unknown + h, creep, centre) - left) / h.sum() for h in steps]
-            move = np.linalg.solve(np.array(slopes).T, left)
-            most = np.abs(move / np.array([0.1, 0.5 * abs(unknown[1])])).max()
-            unknown = unknown - move / max(1.0, most)
-            if not self.tip and not 0.05 < unknown[0] < 0.9:
-                return None
-        return None
-
-    def solve(self, centre: np.ndarray, turn: float, creep: float) -> tuple[np.ndarray, float, float] | None:
-        """For the circle's centre (cones) in the whisker's frame turned so far; None when it lets go."""
-        for _ in range(4):
-            found = self._newton(centre, creep)
-            if found is None:
-                return None
-            edge = -self._out * self._friction  # ratio at which the tip's whisker is parallel to the surface
-            fits = found[0] < edge if self.tip else found[0] <= TIP / CONE
-            if fits:
-                look = self._look(found, creep)
-                arc = TIP / CONE if self.tip else found[0]
-                now = (look[1] + turn, arc)
-                slid = 0.0 if self._last is None else -self._radius * (now[0] - self._last[0]) - (arc - self._last[1])
-                if slid * self._out >= -1e-6 * max(1.0, self._radius):
-                    self._unknown, self._last = found, now
-                    return look
-                self._out = -self._out
-            else:
-                self.tip = not self.tip
-                self._unknown = np.array([edge - 1e-3 if self.tip else TIP / CONE - 1e-4, found[1]])
-        return None
-
-
-def surface(plan: Plan, draw: Draw) -> Scene | None:
-    """A plan whose object is round; None when nothing is felt. A flat one's ends where the whisker would lie along
-    it."""
-    radius_m, touched_m, normal, bases = plan.round_m, plan.touched_m, plan.normal, plan.bases
-    tip = touched_m >= TIP
-    centre, directions = seen(bases, np.tile(plan.centre, (len(bases), 1)))
-    first = np.tan(QUARTER - normal - np.arctan(draw.friction)) if tip else touched_m / CONE
-    shape = Surface(radius_m, draw.friction, tip, first)
-    rows, creep = [], 0.0
-    for i in range(EVERY - 1, len(bases), EVERY):
-        look = shape.solve(centre[i] / CONE, directions[i], creep)
-        if look is None or (tip and radius_m > 1.0 and not shape.tip):
-            break
-        rows.append((*(CONE * look[0]), look[1], look[2] + creep))
-        creep += EVERY * TICK_S / CREEP_S * (CREEP * look[2] - creep)
-    if len(rows) < 10:
-        return None
-    at = np.arange(EVERY - 1, EVERY * len(rows), EVERY)
-    used = np.arange(at[0], at[-1] + 1)
-    columns = [np.interp(used, at, column) for column in np.array(rows).T]
-    point, normals = np.column_stack(columns[:2]), columns[2]
-    still = np.zeros((len(used), 2))
-    reported = bases[used] * (1 + draw.motion)
-    none = np.full(len(used), np.nan)
-    return Scene(reported, draw.measured(columns[3]), point, normals, still, centre[used], none)
-
-
-def simulated(plan: Plan, draw: Draw) -> Scene | None:
-    """The plan by the simulator's mechanics."""
-    return surface(plan, draw) if plan.round_m > 0.0 else Corner(plan).scene(draw)
 
 
 def chained(plan: Plan, draw: Draw) -> Scene | None:

@@ -19,11 +19,10 @@ from .. import store
 from .cost import cost
 from .real import boreal, boreal_left_out, fabrics, fabrics_left_out, vulpi_left_out, vulpi_terrains
 from .simulated import borders, floors_left_out, other_robot, refusals, single_surfaces, stability
-from .surfaces import faces, faces_contact
 
 CACHE = store.kept("texture")
 FLOORS = (cost, single_surfaces, other_robot, borders, refusals, floors_left_out, stability)
-PARTS = {f.__name__: f for f in (*FLOORS, faces, faces_contact)}
+PARTS = {f.__name__: f for f in FLOORS}
 REAL = {  # by the folder that is given
     "fabricslide": {"fabricslide": fabrics, "fabrics_left_out": fabrics_left_out},
     "borealtc": {"borealtc": boreal, "boreal_left_out": boreal_left_out},

@@ -1,7 +1,7 @@
 """Tables of docs/results/texture.md."""
 
 from ..store import read_result
-from ..tables import lined, named, table
+from ..tables import lined, named
 from .scores import METHODS
 
 SCORES = {"right": "accuracy", "wrong": "wrong_answers", "unknown": "refused", "error": "calibration_error"}
@@ -113,15 +113,3 @@ def untrained() -> str:
             "of windows": "{trained_windows}",
         },
     )
-
-
-def faces() -> str:
-    found = read_result("texture")["faces"]
-    robots = list(dict.fromkeys(key.split("|")[1] for key in found))
-    rows = []
-    for motion in dict.fromkeys(key.split("|")[0] for key in found):
-        scores = [found[f"{motion}|{robot}"] for robot in robots]
-        rows.append(
-            [motion, *(f"{100 * s[key]:.1f}" for s in scores for key in SCORES.values()), str(scores[0]["windows"])]
-        )
-    return table(["motion", *(f"{robot}: {title}" for robot in robots for title in SCORES), "windows"], rows)
