@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Measures how much of the hand-written gateware its benches exercise: lines (with branches) and toggles of every bit.
 
-Runs the cocotb benches built with Verilator's coverage, adds their counts up and prints a line per module; then every point
-never reached, but for those that fpga/tb/coverage.toml gives a reason for. Fails below 95 % of either kind, reasons included.
+Runs every bench of fpga/tb built with Verilator's coverage, adds their counts up and prints a line per module of fpga; then
+every point never reached, but for those that fpga/tb/coverage.toml gives a reason for, and the modules that no bench holds.
+Fails below 95 % of either kind, reasons included.
 Example: `tools/coverage_rtl.py --out build/coverage`.
 """
 
@@ -16,8 +17,8 @@ from collections import defaultdict
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-RTL = ROOT / "fpga" / "bridge_rtl"
-BENCHES = ("crc8", "frame", "control", "link", "ticks", "stores", "bridge", "lanes")
+BENCHES = sorted({path.parent for path in (ROOT / "fpga/tb").glob("*/test_*.py")})
+MODULES = {path.stem for folder in ("boards", "bridge_rtl", "usb") for path in (ROOT / "fpga" / folder).glob("*.v")}
 REASONS = ROOT / "fpga" / "tb" / "coverage.toml"
 ENOUGH = 0.95
 FIELD = re.compile("\x01([^\x02]*)\x02([^\x01']*)")
@@ -28,7 +29,7 @@ Point = tuple[str, str, int, str]  # module, kind, line, what
 def measure(out: Path) -> None:
     """Runs the benches; coverage.dat of each is left under `out`."""
     environment = {**os.environ, "WHISKER_BENCH_COVERAGE": "1", "WHISKER_BENCH_BUILD": str(out)}
-    command = [sys.executable, "-m", "pytest", "-q", *(f"fpga/tb/{bench}" for bench in BENCHES)]
+    command = [sys.executable, "-m", "pytest", "-q", *map(str, BENCHES)]
     subprocess.run(command, cwd=ROOT, env=environment, check=True)
 
 
@@ -41,7 +42,7 @@ def points(path: Path) -> dict[Point, int]:
         text, count = line[3:].rsplit("' ", 1)
         fields = dict(FIELD.findall(text))
         source = Path(fields["f"])
-        if source.parent.name != RTL.name:
+        if source.stem not in MODULES or source.suffix != ".v":
             continue
         kind = "toggle" if fields["page"].startswith("v_toggle") else "line"
         found[source.stem, kind, int(fields["l"]), fields.get("o", "")] += int(count)
@@ -96,6 +97,7 @@ def report(total: dict[Point, int], reasons: list[dict]) -> bool:
             f"{kind}s: {100 * reached / count:.1f} % reached, {100 * (reached + known) / count:.1f} % with reasons, of {count}"
         )
         enough = enough and reached + known >= ENOUGH * count
+    print(f"in no bench of fpga/tb: {', '.join(sorted(MODULES - {point[0] for point in total}))}")
     for point in sorted(total):
         if total[point] == 0 and not excused(point, reasons):
             print(f"never: {point[0]}.v:{point[2]} {point[1]} {point[3]}")

@@ -12,7 +12,10 @@ from quickmodels import quick_models
 
 SEED = 3
 SIMULATED_S = 600.0  # at most: every fault comes once
-SHORT = ("driver of the base killed", "pilot killed", "whisker dead", "network broken, 5 s")
+SHORT = (
+    *("whiskerd killed", "driver of the base killed", "guard of the base killed", "pilot killed"),
+    *("whisker dead", "network broken, 5 s"),
+)
 
 
 @pytest.fixture(scope="module")

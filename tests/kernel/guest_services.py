@@ -354,16 +354,6 @@ def base_stops_alone(_: Checks) -> None:
     await_active(base_unit(BASES[0]))
 
 
-def base_driver_killed(_: Checks) -> str:
-    """The driver alone killed while it drives: the guard stops the wheels and starts another."""
-    port = BASES[0]
-    drive(port, lambda: os.kill(int(health(port)["driver_pid"]), signal.SIGKILL))
-    require_still(port)
-    restarts = show(base_unit(port), "NRestarts")
-    require(restarts == "0", f"systemd has restarted it {restarts} times")
-    return f"{health(port)['restarts']} restart by the guard"
-
-
 def base_killed(_: Checks) -> str:
     """Guard and driver killed while it drives: systemd starts others, and the wheels stand."""
     took = drive(BASES[0], lambda: restarted(base_unit(BASES[0]), signal.SIGKILL))
@@ -441,7 +431,7 @@ def main() -> None:
         checks.run(f"services {check.__name__}", check)
     for check in (daemon_limits, daemon_killed, daemon_hangs, daemon_stopped, name_taken, replug):
         checks.run(f"services {check.__name__}", check)
-    for check in (bases_start, base_ports, base_access, base_stops_alone, base_driver_killed, base_killed, base_frozen):
+    for check in (bases_start, base_ports, base_access, base_stops_alone, base_killed, base_frozen):
         checks.run(f"services {check.__name__}", check)
     for check in (base_inhibits_sleep, base_stands_asleep, base_unplugged, bases_stop):
         checks.run(f"services {check.__name__}", check)

@@ -124,7 +124,7 @@ REASONS = {
     ),
     "another test runs it beside what it needs": (
         "whisker ros2 robot-run/scene --rmw cyclonedds",  # host/python/tests/robot/standard/test_robot_cyclonedds.py
-        "whisker robot scenes/mine --simulated --desktop --seconds 120 --out try",  # test_walkthrough.py, shorter
+        "whisker robot scenes/mine --simulated --desktop --seconds 120 --out try",  # tests/drills run it whole
         "whisker view robot-run/robot.mcap",  # host/python/tests/view/test_view_playback.py
         "whisker-base --port /tmp/create --socket base.sock",  # host/python/tests/pilot/test_base_emulator.py
         "whisker scene from build/demo --out scenes/demo",  # lab/tests/scenes/test_scenes.py reads a smaller run

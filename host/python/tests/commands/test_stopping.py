@@ -38,6 +38,32 @@ def test_a_second_signal_breaks_no_ending(first, second):
     assert (reported.stdout, reported.stderr, reported.returncode) == ("ended in order\n", "", 0)
 
 
+CLOSE = """
+import os, random, signal, threading, time
+from crunchbot.stopping import stop_on_signals
+rng = random.Random(3)
+for _ in range(300):
+    stop, woken = stop_on_signals(), threading.Event()
+    threading.Thread(target=lambda s=stop, w=woken: (s.wait(), w.set()), daemon=True).start()
+    if os.fork() == 0:
+        for number in rng.sample([signal.SIGTERM, signal.SIGHUP, signal.SIGINT], 2):
+            until = time.perf_counter() + rng.uniform(0.0, 200e-6)
+            while time.perf_counter() < until:
+                continue
+            os.kill(os.getppid(), number)
+        os._exit(0)
+    assert woken.wait(60)
+    os.wait()
+print("ended in order")
+"""
+
+
+def test_two_signals_close_together_hang_nobody():
+    """As a dropped ssh, GNU timeout or a script sends them."""
+    done = subprocess.run([sys.executable, "-c", CLOSE], capture_output=True, text=True, timeout=PATIENCE_S)
+    assert (done.stdout, done.returncode) == ("ended in order\n", 0), done.stderr
+
+
 def test_who_ends_by_an_interrupt_gets_one():
     reported = run(
         use="interrupt_on_signals", before="interrupt_on_signals()", waits="pass", first="SIGTERM", second="SIGINT"

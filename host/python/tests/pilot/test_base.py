@@ -216,6 +216,20 @@ def test_a_killed_guard_stops_the_wheels_and_ends_the_driver(start):
     driver.peer.await_start()
 
 
+def test_a_killed_guard_and_a_driver_that_hangs_stand_with_the_next_start(start):
+    """As the supervisor goes about it: what is left of a program that ended is killed, and another started."""
+    driver = start("--clock", "stream")
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
+        left = int(client.health()["driver_pid"])
+        os.kill(left, signal.SIGSTOP)
+        assert driver.end(signal.SIGKILL) == -signal.SIGKILL
+        os.kill(left, signal.SIGKILL)
+    driver.start()
+    driver.peer.await_start()
+
+
 def test_a_driver_that_hangs_is_no_hindrance_to_an_end(start):
     driver = start("--clock", "stream")
     with driver.client() as client:
