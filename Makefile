@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-rtl demo-map demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build setup setup-tests example-data docs manual gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-rtl demo-map demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build build-demo setup setup-demo setup-tests example-data docs manual gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -14,16 +14,16 @@ help: ## this list
 # Matrices are small here: a second thread of NumPy's library mostly waits, at full load, and changes the order of sums.
 demo demo-rtl demo-map demo-long test test-all mutants: export OPENBLAS_NUM_THREADS = 1
 
-demo: build ## the whole chain on simulated hardware, magnet to pose: about half a minute; SEED=n chooses the seed
+demo: build-demo ## the whole chain on simulated hardware, magnet to pose: about half a minute; SEED=n chooses the seed
 	@$(PYTHON) -m crunchbot_lab.demo --out build/demo --build-dir $(BUILD) --seed $(SEED)
 
-demo-rtl: build ## the same with every clock cycle of the bridge simulated, not only those of the first seconds: about a minute
+demo-rtl: build-demo ## the same with every clock cycle of the bridge simulated, not only those of the first seconds: about a minute
 	@$(PYTHON) -m crunchbot_lab.demo --out build/demo --build-dir $(BUILD) --seed $(SEED) --level rtl
 
-demo-map: build ## the whole robot maps an unknown arena for 300 s, then finds itself in its own map: about three minutes; SEED=n
+demo-map: build-demo ## the whole robot maps an unknown arena for 300 s, then finds itself in its own map: about three minutes; SEED=n
 	@$(PYTHON) -m crunchbot_lab.demo.mapping --out build/demo-map --build-dir $(BUILD) --seed $(SEED)
 
-demo-long: build ## 30 simulated minutes of the whole robot, with a report; SEED=n; LEVEL=bytes, or signals (a minute), or rtl
+demo-long: build-demo ## 30 simulated minutes of the whole robot, with a report; SEED=n; LEVEL=bytes, or signals (a minute), or rtl
 	@$(PYTHON) -m crunchbot_lab.demo.long --out build/demo-long --build-dir $(BUILD) --seed $(SEED) --level $(LEVEL)
 
 test: setup-tests build lint ## everything that fits in 15 minutes on two cores
@@ -63,11 +63,17 @@ release-check: build sbom ## make a release twice and compare every byte; [BOARD
 sbom: build ## the software bill of materials: build/sbom.json (CycloneDX)
 	@$(PYTHON) tools/sbom.py --build-dir $(BUILD)
 
+build-demo: setup-demo ## compile what the demos and the command line run, into the same folder
+	@tools/build.sh $(BUILD) demo
+
 build: setup ## compile libraries, daemon, firmware core, simulated bridge and the Python modules
 	@tools/build.sh $(BUILD)
 
 setup: ## install what the build lacks: Debian packages, locked Python packages
 	@tools/setup.sh
+
+setup-demo: ## only what the demos and the command line need
+	@tools/setup.sh --demo
 
 setup-tests: ## and what the tests need besides: clang, spin, compiler and simulator for AVR
 	@tools/setup.sh --tests

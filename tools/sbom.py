@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Writes the software bill of materials, CycloneDX 1.6 as JSON: `make sbom`.
 
-Python packages with their hashes from requirements.lock, Debian packages that the build asks for (tools/setup.sh) and that
-hold the libraries of the programs, with the versions of this machine. Scope `required`: on a robot or in its bitstream;
+Python packages with their hashes from requirements-demo.lock and requirements.lock, Debian packages that the build asks for
+(tools/setup.sh) and that hold the libraries of the programs, with the versions of this machine. Scope `required`: on a robot or in its bitstream;
 `excluded`: builds and tests only. The same tree and packages give the same bytes.
 """
 
@@ -31,6 +31,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ON_ROBOT = ("robot", "record", "scenes", "view")  # extras of pyproject.toml
 GATEWARE = ["luna-usb"]  # its USB core becomes Verilog of the bridge
 PROGRAMS = ("whiskerd", "whisker-log", "whisker-flash", "whisker-base")
+LOCKS = ("requirements-demo.lock", "requirements.lock")
 LOCKED = re.compile(r"^([^\s[]+)(?:\[\S+\])?==(\S+)((?: \\\n +--hash=sha256:[0-9a-f]{64})+)$", re.MULTILINE)
 
 
@@ -75,7 +76,7 @@ def needed(names: Iterable[str], known: set[str]) -> set[str]:
 
 
 def python_packages(lock: str) -> Iterator[Component]:
-    """Each entry of requirements.lock."""
+    """Each entry of the two locks."""
     entries = LOCKED.findall(lock)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = [line for extra, lines in project["optional-dependencies"].items() if extra in ON_ROBOT for line in lines]
@@ -112,7 +113,8 @@ def debian_packages(build: Path) -> Iterator[Component]:
 
 def bill(build: Path) -> str:
     """The whole list as JSON."""
-    found = [*python_packages((ROOT / "requirements.lock").read_text()), *debian_packages(build)]
+    lock = "".join((ROOT / name).read_text() for name in LOCKS)
+    found = [*python_packages(lock), *debian_packages(build)]
     named = "\n".join(sorted(f"{one.bom_ref.value} {one.scope}" for one in found))
     bom = Bom(components=found, serial_number=uuid.uuid5(uuid.NAMESPACE_URL, named))
     version = re.search(r"^project\(whisker VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(), re.MULTILINE)[1]

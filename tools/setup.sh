@@ -1,11 +1,11 @@
 #!/bin/sh
 # Installs what the build needs and this machine lacks: Debian packages, then Python packages locked by hash into .venv.
-# `--tests`: also what the tests alone need. The names are Debian's, tried on 12 and 13; Ubuntu has the same from 24.04
-# on as far as known, not tried.
+# `--demo`: only the Python packages that the demo and the command line need. `--tests`: also the Debian packages that the
+# tests alone need. The names are Debian's, tried on 12 and 13; Ubuntu has the same from 24.04 on as far as known, not tried.
 set -eu
 cd "$(dirname "$0")/.."
-tests=no
-[ "${1:-}" != --tests ] || tests=yes
+. tools/costs.sh
+for_what=${1:-}
 
 # command, file or pkg-config module -> Debian package
 wanted_to_build() {
@@ -14,6 +14,7 @@ cmd:gcc gcc
 cmd:g++ g++
 cmd:cmake cmake
 cmd:ninja ninja-build
+cmd:ccache ccache
 cmd:pkg-config pkg-config
 cmd:python3 python3
 cmd:perl perl
@@ -44,7 +45,7 @@ LIST
 
 wanted() {
     wanted_to_build
-    [ "$tests" = no ] || wanted_to_test
+    [ "$for_what" != --tests ] || wanted_to_test
 }
 
 present() {
@@ -75,20 +76,33 @@ if [ -n "$missing" ]; then
 fi
 
 python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "setup: python3 is older than 3.11; install Python 3.11 or newer" >&2; exit 1; }
-stamp=.venv/.locked
-if ! [ -e "$stamp" ] || ! cmp -s requirements.lock "$stamp"; then
-    echo "setup: installing the locked Python packages into .venv (about 690 MB, one to three minutes)"
+
+# A copy of a lock in .venv says that all of it is installed; the lock of everything includes the demo's.
+installed() { # lock...
+    for lock; do cmp -s "$lock" ".venv/$lock" || return 1; done
+}
+
+install_locked() { # what it costs, lock, locks that are installed then...
+    echo "setup: installing the Python packages of $2 into .venv ($1)"
+    lock=$2
+    shift 2
     python3 -m venv .venv
-    .venv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock ||
+    # Python compiles what is imported; compiling all here takes longer than installing it.
+    .venv/bin/pip install --quiet --disable-pip-version-check --no-compile --require-hashes -r "$lock" ||
         { echo "setup: Python packages could not be installed; check the package index or proxy, then run make again" >&2; exit 1; }
-    cp requirements.lock "$stamp"
+    cp "$@" .venv/
+}
+
+if [ "$for_what" = --demo ]; then
+    installed requirements-demo.lock || install_locked "$DEMO_PACKAGES" requirements-demo.lock requirements-demo.lock
+else
+    installed requirements-demo.lock requirements.lock ||
+        install_locked "$ALL_PACKAGES" requirements.lock requirements-demo.lock requirements.lock
 fi
 # The editable installs follow pyproject.toml: names of packages and programs stand there.
 stamp=.venv/.installed
 if ! cat pyproject.toml lab/pyproject.toml | cmp -s - "$stamp"; then
-    for project in . lab; do
-        .venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable "$project" ||
-            { echo "setup: $project could not be installed into .venv; delete .venv and run make again" >&2; exit 1; }
-    done
+    .venv/bin/pip install --quiet --disable-pip-version-check --no-compile --no-deps --no-build-isolation --editable . --editable lab ||
+        { echo "setup: the packages of this tree could not be installed into .venv; delete .venv and run make again" >&2; exit 1; }
     cat pyproject.toml lab/pyproject.toml >"$stamp"
 fi

@@ -1,6 +1,6 @@
 """Writes the bridge's USB device as Verilog: `generate.py OUT.v [--serial TEXT] [--board NUMBER] ...`.
 
-LUNA (pinned in requirements.lock) gives the device core; descriptors.py, hid_requests.py and endpoints.py make it the
+LUNA (pinned in requirements-demo.lock) gives the device core; descriptors.py, hid_requests.py and endpoints.py make it the
 bridge's composite device. The output carries LUNA's licence notice and is a build product, never committed.
 """
 

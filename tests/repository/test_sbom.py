@@ -37,7 +37,7 @@ def test_schema_accepts_it_and_refuses_a_damaged_one(text):
 
 
 def test_every_locked_package_is_there_with_all_its_hashes(components):
-    lock = (ROOT / "requirements.lock").read_text()
+    lock = "".join((ROOT / name).read_text() for name in ("requirements-demo.lock", "requirements.lock"))
     locked = re.findall(r"^([\w-]+)(?:\[\w+\])?==(\S+)", lock, re.MULTILINE)
     assert {f"pkg:pypi/{name}@{version}" for name, version in locked} == {
         purl for purl in components if purl.startswith("pkg:pypi/")

@@ -7,7 +7,14 @@ ROOT = Path(__file__).resolve().parents[2]
 TEXT = {".c", ".h", ".cpp", ".hpp", ".cc", ".py", ".v", ".vh", ".js", ".css", ".html", ".md", ".sh", ".toml", ".txt"}
 TEXT |= {".cmake", ".in", ".msg", ".rules", ".conf", ".rs", ".pml", ".yml", ".yaml", ".json", "Makefile"}
 # What a tool or another program wrote: its words and layout are not ours.
-GENERATED = ("protocol/gen/", "host/manual/", "bench/results/", "firmware/images/", "requirements.lock")
+GENERATED = (
+    "protocol/gen/",
+    "host/manual/",
+    "bench/results/",
+    "firmware/images/",
+    "requirements.lock",
+    "requirements-demo.lock",
+)
 
 
 def tracked(root: Path = ROOT) -> list[str]:

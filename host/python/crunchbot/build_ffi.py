@@ -118,12 +118,17 @@ def find_library(build: Path, name: str) -> Path | None:
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build-dir", type=Path, required=True, help="CMake's build folder, with the static libraries")
-    build = parser.parse_args(argv).build_dir.resolve()
+    parser.add_argument("--libraries", action="store_true", help="only name the static libraries that are linked")
+    options = parser.parse_args(argv)
+    build = options.build_dir.resolve()
     archives = {name: find_library(build, name) for name in LIBRARIES}
     missing = [f"lib{name}.a" for name, archive in archives.items() if archive is None]
     if missing:
         print(f"build_ffi: {build}: no {' and no '.join(missing)}; run cmake --build {build} first", file=sys.stderr)
         return 1
+    if options.libraries:
+        print(*archives.values(), sep="\n")
+        return 0
     ffi = new_ffi()
     ffi.set_source(
         "_native",

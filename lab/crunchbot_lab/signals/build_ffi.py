@@ -95,12 +95,17 @@ def compile_module(archives: list[Path]) -> Path:
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build-dir", type=Path, required=True, help="CMake's build folder, with the static libraries")
+    parser.add_argument("--libraries", action="store_true", help="only name the static libraries that are linked")
+    options = parser.parse_args(argv)
     try:
-        module = compile_module(find_archives(parser.parse_args(argv).build_dir.resolve()))
+        archives = find_archives(options.build_dir.resolve())
     except FileNotFoundError as error:
         print(f"build_ffi: {error}", file=sys.stderr)
         return 1
-    print(f"build_ffi: {module}")
+    if options.libraries:
+        print(*archives, sep="\n")
+    else:
+        print(f"build_ffi: {compile_module(archives)}")
     return 0
 
 

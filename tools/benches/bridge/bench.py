@@ -18,8 +18,9 @@ from .. import store
 from .chain import LINKS
 
 ROOT = Path(__file__).resolve().parents[3]
+LOCKS = ("requirements-demo.lock", "requirements.lock")
 # What place and route follows from.
-GATEWARE = ("fpga/boards", "fpga/bridge_rtl", "fpga/usb", "fpga/toolchain.py", "protocol", "requirements.lock")
+GATEWARE = ("fpga/boards", "fpga/bridge_rtl", "fpga/usb", "fpga/toolchain.py", "protocol", *LOCKS)
 CACHE = store.kept("bridge", *GATEWARE)
 sys.path[:0] = [str(ROOT / "fpga" / folder) for folder in ("boards", "tb")]
 
