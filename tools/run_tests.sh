@@ -30,8 +30,8 @@ if [ "${1:-}" = --long ]; then
     echo "test: larger models of the ring, and 100000 readers and writers killed"
     host/libwhisker/model/check.sh --long
     build/release/host/libwhisker/test/stress_ring 100000
-    echo "test: the bridge's two levels by more scripts"
-    build/release/sim/bridge/tests/test_bridge_levels 4000 2
+    echo "test: the bridge's two levels by more seeds"
+    build/release/sim/bridge/tests/test_bridge_mixed 100
     echo "test: the node's image, ten thousand ticks, each step of an update"
     WHISKER_BUILD=build/release WHISKER_IMAGE_LONG=1 .venv/bin/python -m pytest --quiet sim/node_image
     if command -v doxygen >/dev/null; then

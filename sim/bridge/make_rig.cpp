@@ -1,6 +1,5 @@
 #include "make_rig.h"
 
-#include "bytes_rig.h"
 #include "mixed_rig.h"
 #include "rtl_rig.h"
 
@@ -10,9 +9,6 @@ namespace bridge_sim
 std::unique_ptr<Rig> make_rig(Level level, size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits,
                               uint64_t rtl_ticks)
 {
-    if (level == Level::BYTES) {
-        return std::make_unique<BytesRig>(populated, seed, traits);
-    }
     if (level == Level::MIXED) {
         return std::make_unique<MixedRig>(populated, seed, traits, rtl_ticks);
     }

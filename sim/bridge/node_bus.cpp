@@ -140,7 +140,8 @@ void NodeBus::select_edge(bool low)
         bits_ = 0;
         sent_.fill(0);
     } else {
-        remember_transfer();
+        previous_ = sent_;
+        fault_ = LinkFault::NONE;
     }
     driven_ = UINT32_MAX;
     miso_ = UINT32_MAX;
@@ -152,10 +153,7 @@ std::array<uint64_t, LANES> NodeBus::transfer(uint64_t order)
     for (size_t lane = 0; lane < nodes_.size(); lane++) {
         sent_[lane] = arrived_[lane] = sim_node_transfer(nodes_[lane].get(), order);
     }
-    if (fault_ != LinkFault::NONE) {
-        arrived_[fault_lane_] = damaged(arrived_[fault_lane_]);
-    }
-    remember_transfer();
+    previous_ = sent_;
     return arrived_;
 }
 
@@ -183,24 +181,6 @@ void NodeBus::play_edge(Levels now, Levels before)
         const uint32_t bit = (*played_)[lane] >> (RECORD_BITS - bits_) & 1u;
         miso_ = (miso_ & ~(1u << lane)) | bit << lane;
     }
-}
-
-uint64_t NodeBus::damaged(uint64_t bits) const
-{
-    switch (fault_) {
-    case LinkFault::DEAD:
-        return UINT64_MAX;
-    case LinkFault::STALE:
-        return previous_[fault_lane_];
-    default:
-        return fault_bit_ < RECORD_BITS ? bits ^ UINT64_C(1) << (RECORD_BITS - 1 - fault_bit_) : bits;
-    }
-}
-
-void NodeBus::remember_transfer()
-{
-    previous_ = sent_;
-    fault_ = LinkFault::NONE;
 }
 
 void NodeBus::sck_edge(bool level, bool mosi)

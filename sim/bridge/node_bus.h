@@ -59,10 +59,10 @@ class NodeBus
     }
 
     // The edges of a whole transfer at once: select, the bits of this order, first one highest, and select again.
-    // Returns what arrives of each lane, likewise.
+    // Returns what arrives of each lane, likewise; the wires damage nothing of it.
     std::array<uint64_t, LANES> transfer(uint64_t order);
 
-    // What that transfer brought, damage included.
+    // What that transfer brought.
     const std::array<uint64_t, LANES> &arrived() const;
 
     // The next transfers bring these bits, likewise, and the nodes hear nothing of them; null: the nodes answer again.
@@ -92,9 +92,7 @@ class NodeBus
     void sync_edge();
     void select_edge(bool low);
     void sck_edge(bool level, bool mosi);
-    void remember_transfer();
     void damage();
-    uint64_t damaged(uint64_t bits) const;
     void fail_supplies();
 
     std::vector<std::unique_ptr<sim_node, NodeDeleter>> nodes_;

@@ -1,6 +1,6 @@
 // Bridge, nodes and USB host on one bench: runs one tick at a time, with USB transactions in between, and knows how
 // many bytes of frames the FIFO must hold. There are two: the Verilated gateware with a host at packet level
-// (rtl_rig.h), and transactions without a clock (bytes_rig.h).
+// (rtl_rig.h), and that with a model of bytes for plain sampling (mixed_rig.h).
 #pragma once
 
 #include <functional>
@@ -16,7 +16,7 @@ namespace bridge_sim
 
 // How much of the bridge is simulated; what comes over USB is the same. MIXED: bytes where nothing but plain sampling
 // goes on, RTL else.
-enum class Level { RTL, BYTES, MIXED };
+enum class Level { RTL, MIXED };
 
 class Rig
 {
@@ -45,7 +45,7 @@ class Rig
 
     NodeBus &bus();
     NorFlash &flash();
-    virtual uint64_t cycles() const = 0;         // of the bridge's clock that were simulated; 0 at level bytes
+    virtual uint64_t cycles() const = 0;         // of the bridge's clock that were simulated
     virtual bool running() const = 0;            // started, and the last frame not yet in the FIFO
     virtual uint32_t frames_dropped() const = 0; // since start: the FIFO had no room for them
     virtual bool every_frame() const = 0;        // each frame ends its packet, by the settings

@@ -1,11 +1,17 @@
-// What a tick of plain sampling changes in the bridge, besides its FIFO and the bulk endpoint: carried over from one
-// level of detail to the other.
+// What plain sampling depends on, and what a tick of it changes in the bridge besides its FIFO and the bulk endpoint:
+// carried over from one level of detail to the other.
 #pragma once
 
 #include <cstdint>
 
 namespace bridge_sim
 {
+
+struct SamplingSettings {
+    uint8_t options; // bits of control_options
+    uint32_t lane_mask;
+    uint32_t tick_period; // cycles of 60 MHz
+};
 
 struct SamplingState {
     uint32_t number;                  // of the latest tick

@@ -93,7 +93,7 @@ bool set_defect(void *options, const char *name, const char *text)
 bool set_level(void *options, const char *name, const char *text)
 {
     const std::string level = text;
-    of(options).link.level = level == "rtl" ? Level::RTL : level == "bytes" ? Level::BYTES : Level::MIXED;
+    of(options).link.level = level == "rtl" ? Level::RTL : Level::MIXED;
     return level == "rtl" || level == "bytes" || level == "mixed" ||
            command_line_refuse(PROGRAM, name, text, "give rtl, bytes or mixed");
 }
@@ -205,8 +205,8 @@ std::vector<command_option> all_options()
         own("defect", "KIND", "misbehave: wire-version (claims another), frame (damages one) or truncate (cuts\none)",
             set_defect),
         own("level", "rtl|bytes|mixed",
-            "the Verilated bridge, cycle by cycle; its model at the level of transactions; or that\nwhere nothing but "
-            "plain sampling goes on, and the first one else: the same frames\n(rtl)",
+            "the Verilated bridge, cycle by cycle; or that around requests and faults, and its\nmodel of bytes "
+            "in between: the same frames (rtl)",
             set_level),
         own("rtl-seconds", "S", "level mixed: cycle by cycle for the first S simulated seconds (0)", set_rtl_seconds),
         own("usbip", "PORT", "serve the device by USB/IP on this port of 127.0.0.1 (0: a free one, which is\nprinted)",

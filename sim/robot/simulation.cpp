@@ -123,7 +123,7 @@ namespace
 
 constexpr uint64_t PROGRESS_TICKS = WHISKER_LIMIT_CLOCK_HZ / WHISKER_LIMIT_TICK_PERIOD;
 constexpr int IDLE_WAIT_MS = 1000;
-// While there is something to do: to look who has come costs as much as a tick at level bytes.
+// While there is something to do: to look who has come costs as much as a tick in the model of bytes.
 constexpr unsigned STEPS_TO_LOOK = 8;
 // A command that has not ended so long after SIGTERM is killed.
 constexpr double END_PATIENCE_S = 30;

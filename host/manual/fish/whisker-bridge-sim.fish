@@ -16,7 +16,7 @@ complete -c whisker-bridge-sim -l flash-cut -d 'power goes in the midst of the w
 complete -c whisker-bridge-sim -l lanes-populated -d 'nodes on the first N lanes; those without a whisker are at rest (the scene'\''s; bench: 6)' -x
 complete -c whisker-bridge-sim -l speed-report -d 'ticks, clock cycles, wall seconds, fault counts' -r
 complete -c whisker-bridge-sim -l defect -d 'misbehave: wire-version (claims another), frame (damages one) or truncate (cuts one)' -x
-complete -c whisker-bridge-sim -l level -d 'the Verilated bridge, cycle by cycle; its model at the level of transactions; or that where nothing but plain sampling goes on, and the first one else: the same frames (rtl)' -x -a 'rtl bytes mixed'
+complete -c whisker-bridge-sim -l level -d 'the Verilated bridge, cycle by cycle; or that around requests and faults, and its model of bytes in between: the same frames (rtl)' -x -a 'rtl bytes mixed'
 complete -c whisker-bridge-sim -l rtl-seconds -d 'level mixed: cycle by cycle for the first S simulated seconds (0)' -x
 complete -c whisker-bridge-sim -l usbip -d 'serve the device by USB/IP on this port of 127.0.0.1 (0: a free one, which is printed)' -x
 complete -c whisker-bridge-sim -l usbredir -d 'serve it by usbredir, for QEMU'\''s usb-redir' -x

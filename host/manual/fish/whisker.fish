@@ -90,7 +90,7 @@ complete -c whisker -n '__fish_seen_subcommand_from bridge-sim' -l mechanics -d 
 complete -c whisker -n '__fish_seen_subcommand_from bridge-sim' -l seed -d 'of world, sensors, start (1)' -x
 complete -c whisker -n '__fish_seen_subcommand_from bridge-sim' -l drive -d 'turn on the spot, stand still, or whisk: to one side and the other at a body whisk'\''s rate (turn)' -x -a 'turn still whisk'
 complete -c whisker -n '__fish_seen_subcommand_from bridge-sim' -l pace -d 'simulated seconds per second, at most what the machine can; 0: as fast as it can (default: 1)' -x
-complete -c whisker -n '__fish_seen_subcommand_from bridge-sim' -l level -d 'how much of the bridge is simulated (rtl): the gateware, cycle by cycle, or transactions: the same frames' -x -a 'rtl bytes'
+complete -c whisker -n '__fish_seen_subcommand_from bridge-sim' -l level -d 'how much of the bridge is simulated (rtl): the gateware, cycle by cycle, or only around requests and faults' -x -a 'rtl bytes'
 complete -c whisker -n '__fish_seen_subcommand_from bridge-sim' -l usbip -d 'no whiskerd: give the device to a Linux kernel by USB/IP, on this port of 127.0.0.1 (3240; 0: a free one)' -x
 complete -c whisker -n '__fish_seen_subcommand_from bridge-sim' -l usbredir -d 'the same by usbredir, for a guest in QEMU (4000; 0: a free one)' -x
 complete -c whisker -n '__fish_seen_subcommand_from flash' -s h -d 'show this help message and exit'
@@ -175,7 +175,7 @@ complete -c whisker -n '__fish_seen_subcommand_from pilot' -l traces -d 'CSV of 
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l report -d 'JSON of what was used, skipped and measured' -r
 complete -c whisker -n '__fish_seen_subcommand_from navigator' -s h -d 'show this help message and exit'
 complete -c whisker -n '__fish_seen_subcommand_from navigator' -l help -d 'show this help message and exit'
-complete -c whisker -n '__fish_seen_subcommand_from navigator' -l filter -d 'repeatable; the first one'\''s pose is the robot'\''s (default: adaptive)' -x -a 'odometry ekf ukf foveal grid particle adaptive'
+complete -c whisker -n '__fish_seen_subcommand_from navigator' -l filter -d 'repeatable; the first one'\''s pose is the robot'\''s (default: adaptive)' -x -a 'odometry ekf ukf foveal grid particle multi adaptive'
 complete -c whisker -n '__fish_seen_subcommand_from navigator' -l robot -d 'which robot (default: robot)' -x
 complete -c whisker -n '__fish_seen_subcommand_from navigator' -l listen -d 'endpoint to be reached at, tcp/HOST:PORT or tls/HOST:PORT; repeatable, or '\''none'\'' (default: tcp/127.0.0.1:7459)' -x
 complete -c whisker -n '__fish_seen_subcommand_from navigator' -l connect -d 'endpoint of another process, tcp/HOST:PORT or tls/HOST:PORT; repeatable, or '\''none'\'' (default: tcp/127.0.0.1:7458)' -x
@@ -290,7 +290,7 @@ complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subco
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l scene -d 'a scene of the list, or a scene folder with true poses' -x
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l data -d 'folder of the logs, as DIR/thymio/random_1' -r
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l estimate -d 'x_m, y_m, theta_rad, as in docs/formats.md, of any engine' -r
-complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l filter -d 'run this one of whisker'\''s filters in place of --estimate' -x -a 'odometry ekf ukf foveal grid particle adaptive'
+complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l filter -d 'run this one of whisker'\''s filters in place of --estimate' -x -a 'odometry ekf ukf foveal grid particle multi adaptive'
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l out -d 'write the scene'\''s folder, for an engine of your own to run on' -r
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l near -d 'a row is near within so much (default: 0.06)' -x
 complete -c whisker -n '__fish_seen_subcommand_from bench; and __fish_seen_subcommand_from touch' -l chart -d 'draw error and bits over the way, as SVG or PNG' -r

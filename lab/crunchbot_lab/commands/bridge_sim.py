@@ -55,7 +55,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--drive", choices=list(COURSES), default="turn", help=text)
     text = "simulated seconds per second, at most what the machine can; 0: as fast as it can (default: 1)"
     parser.add_argument("--pace", type=number_above(-1e-9), default=1.0, metavar="X", help=text)
-    text = "how much of the bridge is simulated (%(default)s): the gateware, cycle by cycle, or transactions: the same frames"
+    text = "how much of the bridge is simulated (%(default)s): the gateware, cycle by cycle, or only around requests and faults"
     parser.add_argument("--level", choices=LEVELS, default=LEVELS[0], help=text)
     served = parser.add_mutually_exclusive_group()
     text = (

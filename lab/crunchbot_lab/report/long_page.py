@@ -10,7 +10,7 @@ from .run import FILTERS, Run
 
 LEVELS = {
     "signals": "World, pilot and filters without bits and network; wheels without a Create.",
-    "bytes": "All processes of the robot; bridge and nodes byte by byte.",
+    "bytes": "All processes of the robot; the bridge's gateware cycle by cycle around requests and faults, else byte by byte.",
     "rtl": "All processes of the robot; the bridge's gateware cycle by cycle.",
 }
 

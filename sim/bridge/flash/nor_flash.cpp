@@ -19,6 +19,7 @@ constexpr size_t ADDRESS_END = 4;                    // opcode and address
 constexpr unsigned ERASE_TIME = 3, PROGRAM_TIME = 1; // in questions, as a host would not wait for a real one's 45 ms
 constexpr uint32_t FALLBACK = uint32_t{NorFlash::WRITABLE_SECTORS} << 16, JUMP = NorFlash::SIZE - NorFlash::PAGE;
 constexpr uint8_t PREAMBLE[] = {0xFF, 0xFF, 0xBD, 0xB3}; // of an ECP5's bitstream
+constexpr uint8_t IDENTITY[] = {0xEF, 0x40, 0x14};
 constexpr uint8_t JUMP_OPCODE = 0x7E;
 
 uint32_t address_of(const Bytes &received)
@@ -77,8 +78,8 @@ uint8_t NorFlash::answer(const Bytes &received)
         return 0xFF;
     }
     const size_t sent = received.size();
-    if (opcode == IDENTIFY && sent <= identify().size()) {
-        return identify()[sent - 1];
+    if (opcode == IDENTIFY && sent <= std::size(IDENTITY)) {
+        return IDENTITY[sent - 1];
     }
     if (opcode == READ && sent >= ADDRESS_END) {
         return content_[(address_of(received) + sent - ADDRESS_END) % SIZE];
@@ -107,20 +108,6 @@ void NorFlash::act(const Bytes &received)
     enabled_ = opcode == ENABLE;
 }
 
-Bytes NorFlash::identify() const
-{
-    return {0xEF, 0x40, 0x14};
-}
-
-Bytes NorFlash::read(uint32_t address, size_t count) const
-{
-    Bytes out(count);
-    for (size_t i = 0; i < count; i++) {
-        out[i] = content_[(address + i) % SIZE];
-    }
-    return out;
-}
-
 void NorFlash::erase(uint32_t address)
 {
     write((address % SIZE) / SECTOR * SECTOR, Bytes(SECTOR, 0xFF));
@@ -129,7 +116,7 @@ void NorFlash::erase(uint32_t address)
 void NorFlash::program(uint32_t address, const Bytes &data)
 {
     const uint32_t page = (address % SIZE) / PAGE * PAGE;
-    Bytes content = read(page, PAGE);
+    Bytes content(content_.begin() + page, content_.begin() + page + PAGE);
     for (size_t i = 0; i < data.size(); i++) {
         content[(address + i) % PAGE] &= data[i];
     }

@@ -36,16 +36,12 @@ class NorFlash
     // The transaction is over.
     void act(const Bytes &received);
 
-    // The same as whole orders, without the time they take.
-    Bytes identify() const;
-    Bytes read(uint32_t address, size_t count) const;
-    void erase(uint32_t address);
-    void program(uint32_t address, const Bytes &data);
-
     // Power went: what was under way is over.
     void power_cycle();
 
   private:
+    void erase(uint32_t address);
+    void program(uint32_t address, const Bytes &data);
     void write(uint32_t address, const Bytes &content);
     void save(uint32_t address, uint32_t count) const;
 

@@ -9,7 +9,7 @@ namespace
 {
 
 constexpr uint8_t BULK_ENDPOINT = WHISKER_LIMIT_USB_BULK_IN & 0xFu;
-// Ticks without a disturbance before level bytes takes over: longer than any of them lasts.
+// Ticks without a disturbance before the model of bytes takes over: longer than any of them lasts.
 constexpr uint64_t QUIET_TICKS = 16;
 // With more than that the host is late: what the FIFO does about it is for the registers.
 constexpr uint64_t BYTES_WAITING_MOST = 4 * WHISKER_LIMIT_BULK_PACKET;
@@ -19,7 +19,7 @@ constexpr unsigned PATIENCE = 1000;
 } // namespace
 
 MixedRig::MixedRig(size_t populated, uint64_t seed, const std::vector<NodeTrait> &traits, uint64_t rtl_ticks)
-    : RtlRig(populated, seed, traits), bytes_(bus(), flash_), rtl_ticks_(rtl_ticks)
+    : RtlRig(populated, seed, traits), bytes_(bus()), rtl_ticks_(rtl_ticks)
 {
 }
 
@@ -28,13 +28,7 @@ bool MixedRig::at_rtl() const
     return !at_bytes_;
 }
 
-uint32_t MixedRig::frames_dropped() const
-{
-    return at_bytes_ ? bytes_.frames_dropped() : RtlRig::frames_dropped();
-}
-
-// --------------------------------------------------------------------------------------------- what is for the
-// registers
+// -------------------------------------------------------------------------------------- what is for the registers
 
 bool MixedRig::enumerate(Descriptors &descriptors, const char *&error)
 {
@@ -61,8 +55,7 @@ void MixedRig::power_up()
     RtlRig::power_up();
 }
 
-// ------------------------------------------------------------------------------------------------------------ level
-// bytes
+// ------------------------------------------------------------------------------------------------- plain sampling
 
 Outcome MixedRig::in(uint8_t endpoint, size_t limit, Bytes &data)
 {
@@ -135,14 +128,8 @@ bool MixedRig::byte_tick(const std::function<bool()> &usb_step)
         mark();
     }
     const unsigned frames = microframes(bytes_.tick_period());
-    bytes_.start_of_frame(microframe_++);
-    if (!bytes_.begin_tick()) {
-        return false;
-    }
-    for (unsigned i = 1; i < frames; i++) {
-        bytes_.start_of_frame(microframe_++);
-    }
-    bytes_.end_tick();
+    bytes_.tick(microframe_, frames);
+    microframe_ += frames;
     ticks_.push_back({frames, bus().arrived()});
     return true;
 }
@@ -166,7 +153,7 @@ void MixedRig::disturbed()
     bus().play(nullptr);
     for (unsigned i = 0; again.packets < taken_.size(); i++) {
         if (!take_again(again) || i > PATIENCE) {
-            throw std::runtime_error("the registers do not make the packets that level bytes made");
+            throw std::runtime_error("the registers do not make the packets that the model of bytes made");
         }
     }
     if (in_tick_) {
@@ -205,7 +192,7 @@ bool MixedRig::take_again(Again &again)
         again.taken += packet.size();
         again.packets++;
     } else {
-        throw std::runtime_error("the registers make another packet than level bytes did");
+        throw std::runtime_error("the registers make another packet than the model of bytes did");
     }
     return true;
 }

@@ -1,10 +1,10 @@
-// Levels mixed in one run, by need. Registers stand still while nothing but plain sampling goes on: level bytes makes
-// the frames meanwhile. Before anything else is asked of the bridge (a control transfer, a fault, a host that does not
-// read) the registers go on from where level bytes last stood with no frame under way, and make the ticks since then
+// Levels mixed in one run, by need. Registers stand still while nothing but plain sampling goes on: the model of bytes
+// makes the frames meanwhile. Before anything else is asked of the bridge (a control transfer, a fault, a host that
+// does not read) the registers go on from where that last stood with no frame under way, and make the ticks since then
 // once more, of the same records: their packets must be the same.
 #pragma once
 
-#include "bytes_bridge.h"
+#include "bytes_model.h"
 #include "rtl_rig.h"
 
 namespace bridge_sim
@@ -20,7 +20,6 @@ class MixedRig : public RtlRig
     Outcome control(const SetupRequest &request, Bytes &data) override;
     Outcome in(uint8_t endpoint, size_t limit, Bytes &data) override;
     void arm(WireFault fault) override;
-    uint32_t frames_dropped() const override;
     bool at_rtl() const override;
 
     // Throws std::runtime_error if the registers make other packets of the ticks since then.
@@ -47,13 +46,13 @@ class MixedRig : public RtlRig
     void make_again(const Tick &tick, Again &again);
     bool take_again(Again &again);
 
-    BytesBridge bytes_;
+    BytesModel bytes_;
     bool at_bytes_ = false;
-    bool in_tick_ = false;      // of level bytes, before its start
+    bool in_tick_ = false;      // of the model, before its start
     bool begun_ = false;        // and the registers have started it
     uint64_t rtl_ticks_;        // still to come
     uint64_t quiet_ = 0;        // ticks since anything but sampling went on
-    uint64_t microframe_ = 0;   // of the host, at level bytes
+    uint64_t microframe_ = 0;   // of the host, in the model
     SamplingState marked_{};    // where the registers go on
     uint64_t marked_frame_ = 0; // the host's microframe then
     std::vector<Tick> ticks_;   // since then

@@ -95,10 +95,9 @@ bool BridgeModel::running() const
 // The registers' names as Verilator writes them.
 #define REGISTER(name) top_->rootp->clocked_bridge__DOT__bridge__DOT__##name
 
-LinkSettings BridgeModel::settings() const
+SamplingSettings BridgeModel::settings() const
 {
-    return {REGISTER(sck_divider), REGISTER(word_gap),  REGISTER(sample_point),
-            REGISTER(options),     REGISTER(lane_mask), REGISTER(tick_period)};
+    return {REGISTER(options), REGISTER(lane_mask), REGISTER(tick_period)};
 }
 
 SamplingState BridgeModel::sampling() const

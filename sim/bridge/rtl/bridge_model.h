@@ -3,7 +3,6 @@
 
 #include <memory>
 
-#include "bytes_settings.h"
 #include "flash/nor_flash.h"
 #include "node_bus.h"
 #include "sampling_state.h"
@@ -42,9 +41,9 @@ class BridgeModel : public UtmiDevice
     bool every_frame() const;        // each frame ends its packet
     uint32_t tick_period() const;    // cycles
 
-    // At level bytes a run of plain sampling may go on from here, between two ticks with no frame in the bridge; it
-    // comes back as far as it has come, at such a time.
-    LinkSettings settings() const;
+    // In a model of bytes a run of plain sampling may go on from here, between two ticks with no frame in the bridge;
+    // it comes back as far as it has come, at such a time.
+    SamplingSettings settings() const;
     SamplingState sampling() const;
     void go_on(const SamplingState &state);
 

@@ -2,7 +2,6 @@
 // receives is the same. `test_bridge_mixed SEEDS` for more.
 #include <cstdlib>
 
-#include "bytes_link.h"
 #include "cmocka_cpp.h"
 #include "make_rig.h"
 #include "tick_runner.h"

@@ -190,14 +190,14 @@ void started_again_after_an_overflow(Level level)
 template <void (*TEST)(Level)> void at_both_levels(void **)
 {
     TEST(Level::RTL);
-    TEST(Level::BYTES);
+    TEST(Level::MIXED);
 }
 
 // A host that has halted an idle endpoint gets that answer at its next read, not when the next frame comes.
 void a_halted_endpoint_answers_though_it_has_nothing(void **)
 {
     constexpr uint8_t TO_ENDPOINT = 0x02, TO_INTERFACE = 0x01, CLEAR = 1, SET = 3, SET_INTERFACE = 11;
-    for (const Level level : {Level::RTL, Level::BYTES}) {
+    for (const Level level : {Level::RTL, Level::MIXED}) {
         Host host(level);
         assert_int_equal(host.outcome_of_a_read(), 1);
         assert_int_equal(host.request(TO_ENDPOINT, SET, WHISKER_LIMIT_USB_BULK_IN), 0);
