@@ -1,6 +1,6 @@
 #!/bin/sh
-# Runs every test: C and C++ by CTest, the C code again under sanitizers, then Python, gateware and end to end by pytest.
-# `--long` instead: the Verilated bridge under AddressSanitizer and a minute of fuzzing per decoder.
+# Runs every test: C and C++ by CTest, host and firmware again under sanitizers, then Python, gateware and end to end by pytest.
+# `--long` instead: the whole simulation under AddressSanitizer, a minute of fuzzing per decoder, and more.
 set -eu
 cd "$(dirname "$0")/.."
 
