@@ -1,6 +1,5 @@
-"""The benches: each can be imported and starts programs that are built, results have their origin, rounds are resumable."""
+"""The benches: each can be imported and starts programs that are built, results have their origin."""
 
-import contextlib
 import importlib
 import json
 import re
@@ -14,7 +13,6 @@ ROOT = Path(__file__).resolve().parents[2]
 BENCHES = ROOT / "tools/benches"
 sys.path.insert(0, str(ROOT / "tools"))
 from benches import __main__ as front  # noqa: E402
-from benches import rounds as rounds_module  # noqa: E402
 from benches import store, tables  # noqa: E402
 
 
@@ -94,49 +92,6 @@ def test_the_programs_that_benches_start_are_built():
         assert any(re.search(rf"\b{program}\b", path.read_text()) for path in lists), (
             f"{name}: no CMakeLists.txt names it"
         )
-
-
-@pytest.fixture
-def rounds(monkeypatch, tmp_path):
-    """The module of rounds, whose topics are functions of the test, measured in this process."""
-    monkeypatch.setattr(store, "BENCH", tmp_path)
-    monkeypatch.setattr(store, "commit", lambda: "0123456789ab")
-    rounds_module.topics = {}
-
-    def measure(topic: str, words: list[str]) -> dict:
-        monkeypatch.setattr(store, "LEFT_OUT", {})
-        monkeypatch.setattr(store, "WROTE", [])
-        with contextlib.suppress(RuntimeError), rounds_module.reported(topic, words):
-            rounds_module.topics[topic]()
-        return json.loads(rounds_module.report_of(topic).read_text())
-
-    monkeypatch.setattr(rounds_module, "measure", measure)
-    return rounds_module
-
-
-def test_a_round_goes_on_with_what_is_missing_and_a_topic_that_fails_is_no_hindrance(rounds, capsys):
-    ran, is_broken = [], [True]
-
-    def fails():
-        ran.append("fails")
-        if is_broken[0]:
-            raise RuntimeError("no such\nprogram")
-
-    def peerless():
-        ran.append("peerless")
-        rounds.store.leave_out("iceoryx2", "ld: cannot find -lbsd")
-
-    rounds.topics = {"fails": fails, "peerless": peerless}
-    chosen = {"fails": [], "peerless": ["--rounds", "1"]}
-    assert rounds.measure_all(chosen, ROOT, fresh=False) == 1 and ran == ["fails", "peerless"]
-    said = capsys.readouterr().out
-    assert "FAILED" in said and "RuntimeError: no such program" in said
-    assert "left out: iceoryx2 (ld: cannot find -lbsd)" in said
-    is_broken[0] = False
-    assert rounds.measure_all(chosen, ROOT, fresh=False) == 0 and ran[2:] == ["fails"]
-    lines = [line for line in capsys.readouterr().out.splitlines() if " of 2  " in line]
-    assert len(lines) == 2 and "kept" in lines[1] and "-lbsd" in lines[1]
-    assert rounds.measure_all(chosen, ROOT, fresh=True) == 0 and ran[3:] == ["fails", "peerless"]
 
 
 def test_what_is_kept_is_of_the_state_of_the_tree(monkeypatch, tmp_path):

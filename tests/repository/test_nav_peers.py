@@ -31,7 +31,6 @@ def test_a_build_that_fails_is_reported_with_its_error_and_not_as_a_missing_pack
     (source / "broken.c").write_text("int main(void) { return nothing_of_this_name; }")
     monkeypatch.setattr(peer_runs, "ROOT", tmp_path)
     monkeypatch.setattr(peer_runs, "PEERS", source)
-    monkeypatch.setattr(store, "LEFT_OUT", {})
     monkeypatch.setattr(peer_runs, "NATIVE", tmp_path / "build")
     assert peer_runs.mrpt_entries(BUILD, 1) == []
     assert re.search(r"does not build: .*nothing_of_this_name", capsys.readouterr().out)

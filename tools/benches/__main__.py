@@ -12,6 +12,7 @@ of ROUND, so that they end within 100 minutes on two cores; `--whole` takes each
 import argparse
 import importlib
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -66,36 +67,34 @@ def main() -> None:
 
 
 def run_one(topic: str, words: list[str]) -> None:
-    """Runs a topic and keeps what it reports of itself."""
     bench = bench_of(topic)
     parser = front(f"tools/benches {topic}", bench.__doc__)
     if hasattr(bench, "options"):
         bench.options(parser)
     chosen = vars(parser.parse_args(words))
-    from benches import rounds, store
+    from benches import store
 
     if chosen.pop("fresh"):
         shutil.rmtree(store.kept(topic), ignore_errors=True)
-    with rounds.reported(topic, words):
-        bench.run(chosen.pop("build_dir").resolve(), **chosen)
+    bench.run(chosen.pop("build_dir").resolve(), **chosen)
 
 
 def run_many(words: list[str]) -> None:
+    """Each topic in a process of its own; one that fails is no hindrance to the others."""
     topics = list(TOPICS)
     parser = front("tools/benches", __doc__)
     parser.add_argument("--only", nargs="+", choices=topics, default=topics, metavar="TOPIC", help=", ".join(topics))
     parser.add_argument("--whole", action="store_true", help="each topic at its full size: many hours")
     chosen = parser.parse_args(words)
-    from benches import rounds
-
-    sizes = {} if chosen.whole else ROUND
-    try:
-        failed = rounds.measure_all(
-            {t: sizes.get(t, []) for t in chosen.only}, chosen.build_dir.resolve(), chosen.fresh
-        )
-    except KeyboardInterrupt:
-        sys.exit("bench: interrupted; the same command goes on here")
-    sys.exit(1 if failed else 0)
+    failed = []
+    for topic in chosen.only:
+        options = ["--build-dir", chosen.build_dir, *(["--fresh"] if chosen.fresh else [])]
+        options += [] if chosen.whole else ROUND.get(topic, [])
+        print(f"bench: {topic}", flush=True)
+        if subprocess.run([sys.executable, Path(__file__).parent, topic, *options], check=False).returncode:
+            failed.append(topic)
+    if failed:
+        sys.exit(f"bench: failed: {', '.join(failed)}; the same command goes on with them")
 
 
 def bench_of(topic: str) -> ModuleType:

@@ -56,8 +56,6 @@ COMMAND_OF_CHART = {name: command for command, (_, charts) in MAKES.items() for 
 
 WIDTH = 400  # of a line of a result, at most, where it has parts
 ERROR, LINKER = re.compile(r"\berror\b|cannot find|not found", re.IGNORECASE), re.compile(r"\bld: ")
-WROTE: list[str] = []  # results of this process
-LEFT_OUT: dict[str, str] = {}  # peers and parts of this process that could not be measured, each with its own error
 
 
 @cache
@@ -106,7 +104,6 @@ def failure(*commands: tuple | list, **options) -> str:
 
 def leave_out(name: str, error: str) -> None:
     """Reports a peer, or a part whose data are not here, that is not measured."""
-    LEFT_OUT[name] = error
     print(f"left out: {name}: {error}", flush=True)
 
 
@@ -139,19 +136,7 @@ def record_origin(name: str, folder: Path = RESULTS) -> None:
     path = folder / ORIGINS
     origins = json.loads(path.read_text()) if path.exists() else {}
     origins[name] = {"commit": commit(), "machine": machine()}
-    WROTE.append(name)
     path.write_text(text_of(dict(sorted(origins.items()))) + "\n")
-
-
-def adopt(names: list[str], folder: Path = RESULTS) -> None:
-    """Results that were measured in the present state of the tree, maybe at an earlier commit, are of this one, too."""
-    path = folder / ORIGINS
-    origins = json.loads(path.read_text())
-    now = commit()
-    if any(origins[name]["commit"] != now for name in names):
-        for name in names:
-            origins[name]["commit"] = now
-        path.write_text(text_of(origins) + "\n")
 
 
 def write_chart(name: str, drawn: Figure | str, folder: Path = CHARTS) -> None:

@@ -1,4 +1,4 @@
-"""The bridge in an FPGA: every board at every number of lanes, resources, clock, cycles per tick.
+"""The bridge in an FPGA: every board at every number of lanes, resources, clock.
 
 Place and route takes minutes each, an hour in all, and comes out the same from the same gateware and tools: every one is
 kept as long as these stand, in bench/results/bridge.json, too, so that another machine does not repeat it (to repeat
@@ -6,8 +6,6 @@ it, delete `gateware` there). `--placements N` ends after N new ones, and the ta
 are nextpnr's own; the limits of the PHY's pins are those of fpga/boards/report.py.
 """
 
-import json
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -15,26 +13,20 @@ from pathlib import Path
 from tqdm import tqdm
 
 from .. import store
-from .chain import LINKS
 
 ROOT = Path(__file__).resolve().parents[3]
 LOCKS = ("requirements-demo.lock", "requirements.lock")
 # What place and route follows from.
 GATEWARE = ("fpga/boards", "fpga/bridge_rtl", "fpga/usb", "fpga/toolchain.py", "protocol", *LOCKS)
 CACHE = store.kept("bridge", *GATEWARE)
-sys.path[:0] = [str(ROOT / "fpga" / folder) for folder in ("boards", "tb")]
+sys.path[:0] = [str(ROOT / "fpga" / folder) for folder in ("boards",)]
 
 import build as boards  # noqa: E402
-import cycles  # noqa: E402
 import report  # noqa: E402
-
-from whisker_protocol import FRAME_BYTES, LIMITS  # noqa: E402
 
 COUNTS = (28, 12, 1, 14, 6)  # of lanes; what is asked for most often comes first
 PROCESSES = 2  # of place and route, each of one thread
 TRIES = 8  # seeds, as build.py tries them
-PACES = (4000, 2000, 1000, 600, 530, 522, 521, 520, 519, 518, 517, 516)  # cycles from tick to tick
-PACED_TICKS = 2000
 
 
 def placed(name: str, lanes: int, seed: int) -> dict:
@@ -95,40 +87,6 @@ def facts(name: str, runs: list[dict]) -> dict:
     return {**known, "limits": limits, "least": least, **spare, "runs": sorted(runs, key=lambda run: run["lanes"])}
 
 
-def latency(link: tuple[int, int, int]) -> dict:
-    """From the SYNC that starts a reading to the first byte of its frame for USB, at worst: a period, then the next
-    tick."""
-    transfer = cycles.transfer(*link[:2])
-    total = LIMITS["tick_period"] + transfer + FRAME_BYTES + cycles.FRAMER
-    return {"transfer_cycles": transfer, "first_byte_us": total / LIMITS["clock_hz"] * 1e6}
-
-
-def paced(build: Path, period: int) -> dict:
-    """28 lanes at packet level with a tick asked for every `period` cycles, or what went wrong."""
-    command = [build / "tests/usb/bridge-pace", str(period), str(PACED_TICKS)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return json.loads(done.stdout) if done.stdout else {"period": period, "error": done.stderr.strip()}
-
-
-def sustained(found: dict) -> bool:
-    """Whether every tick became a frame whose records are all good."""
-    return "error" not in found and found["frames"] == found["asked"] and not found["bad_records"]
-
-
-def rates(build: Path) -> dict:
-    """What the bridge sustains when nodes can follow: by its settings' limit, and measured, faster and faster."""
-    tried = [
-        store.once(store.kept("bridge") / f"pace_{period}.json", lambda p=period: paced(build, p)) for period in PACES
-    ]
-    fastest = min(found["period"] for found in tried if sustained(found))
-    hertz = {"settings_hz": LIMITS["clock_hz"] / LIMITS["tick_period_min"], "link_hz": LIMITS["clock_hz"] / fastest}
-    return {
-        **hertz,
-        "usb_bytes_per_s": {name: rate * FRAME_BYTES for name, rate in (("at 2 kHz", 2000), *hertz.items())},
-        "tried": tried,
-    }
-
-
 def measured(board: dict) -> list[dict]:
     """A board's runs that have been placed."""
     return [run for run in board["runs"] if "seed" in run]
@@ -146,5 +104,4 @@ def run(build: Path, placements: int = 10**6) -> None:
     `build` runs the pace alone.
     """
     found = {"gateware": store.state(*GATEWARE)} | fabric(placements)
-    found |= {"latency": {title: latency(link) for title, link in LINKS.items()}, "rates": rates(build)}
     store.write_result("bridge", found)

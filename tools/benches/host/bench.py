@@ -1,14 +1,9 @@
-"""Measures the host's device side: cable to samples, whiskerd's instructions and memory, the clock mapping.
+"""Measures the host's device side: whiskerd's instructions, the clock mapping.
 
-    .venv/bin/python tools/benches host        bench/results/host.json
-
-- Times: a simulated bridge (RTL, umockdev with its udev events, real libusb and hidapi) is plugged in, pulled and put
-  back; watched from a reader of the ring. They hold the simulation's own work: its enumeration, and frames at its
-  speed.
 - Instructions: valgrind counts whiskerd's at 28 populated lanes, as the difference between a short and a long run, by
   library; umockdev's are left out, what the kernel would do is not in. libusb's are an upper bound: under umockdev it
   is woken also when there is nothing.
-- Memory: of whiskerd while it streams. Clock: an hour of the synthetic trace of the library's test.
+- Clock: an hour of the synthetic trace of the library's test.
 """
 
 import csv
@@ -16,19 +11,14 @@ import io
 import os
 import re
 import shutil
-import socket
 import subprocess
 import tempfile
-import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
-from crunchbot.bridge.ring import Reader
 from crunchbot_lab.simulation.scenes import make_scene
 from whisker_protocol import LANES, LIMITS
 
@@ -39,13 +29,8 @@ CACHE = store.kept("host")
 HZ = LIMITS["clock_hz"] // LIMITS["tick_period"]
 ATOM_HZ = 0.8e9  # instructions per second of the paper's netbook
 LINK = ("--sck-divider", "6", "--word-gap", "30", "--sample-point", "5")
-LONG_S = 600  # simulated; the runs are ended before
-CYCLES = 10  # pulls and puts of the cable
 COUNTED_S = (1, 4)  # simulated seconds of the two counted runs
 BATCHES = (2, 4, 8, 16)
-SETTLE = 400  # frames after which a stream counts as up
-LOOK_S = 0.0002
-PATIENCE_S = 60
 CLOCK_SEEDS = (101, 102, 103)
 
 
@@ -59,87 +44,6 @@ def simulation(build: Path, folder: Path, seconds: int, *options) -> list[str]:
     path.write_text(scene.flat(start))
     words = ["umockdev-wrapper", program(build, "whisker-bridge-sim"), "--scene", path, "--seconds", seconds]
     return [str(word) for word in [*words, "--lanes-populated", LANES, *options, "--"]]
-
-
-# ---------------------------------------------------------------------------------------------------------------------
-# cable
-
-
-@contextmanager
-def bridge(build: Path, *options) -> Iterator[tuple[socket.socket, Reader]]:
-    """A simulated bridge with whiskerd: the socket that pulls its cable, and a reader of its ring."""
-    ring = f"whisker-bench-{os.getpid()}"
-    with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as link:
-        path = Path(folder) / "sim.sock"
-        command = simulation(build, Path(folder), LONG_S, "--socket", path, *options)
-        command += [program(build, "whiskerd"), "--ring", ring, "--wait", *LINK]
-        process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-        try:
-            until(lambda: link.connect_ex(str(path)) == 0)
-            with Reader(ring, wait_s=PATIENCE_S) as reader:
-                yield link, reader
-        finally:
-            process.terminate()
-            process.wait(PATIENCE_S)
-
-
-def until(condition: Callable[[], bool]) -> None:
-    give_up = time.monotonic() + PATIENCE_S
-    while not condition():
-        if time.monotonic() > give_up:
-            raise RuntimeError("bench_host: the bridge does not react; run tests/chain/test_daemon.py")
-        time.sleep(LOOK_S)
-
-
-def connected(reader: Reader) -> bool:
-    stats = reader.stats
-    return stats is not None and stats.connected == 1
-
-
-def timed(link: socket.socket, message: str, happened: Callable[[], bool]) -> float:
-    """Seconds from a word to the cable until it shows."""
-    begin = time.monotonic()
-    link.send(message.encode())
-    until(happened)
-    return time.monotonic() - begin
-
-
-def more(reader: Reader, count: int) -> Callable[[], bool]:
-    wanted = reader.info.published + count
-    return lambda: reader.info.published >= wanted
-
-
-def cable_times(build: Path) -> dict:
-    """Seconds of each event, CYCLES times."""
-    times = defaultdict(list)
-    for _ in tqdm(range(CYCLES), desc="plug in", unit="time"):
-        with bridge(build, "--unplugged") as (link, reader):
-            until(lambda reader=reader: reader.stats is not None)
-            times["plug"].append(timed(link, "plug", more(reader, 1)))
-    with bridge(build) as (link, reader):
-        for _ in tqdm(range(CYCLES), desc="pull, put back", unit="time"):
-            until(more(reader, SETTLE))
-            times["unplug"].append(timed(link, "unplug", lambda: not connected(reader)))
-            times["replug"].append(timed(link, "plug", more(reader, 1)))
-    return dict(times)
-
-
-def memory(build: Path) -> dict:
-    """Bytes of whiskerd while it streams: resident, of which its own (private), and of which the ring and libraries."""
-    with bridge(build) as (_, reader):
-        until(more(reader, SETTLE))
-        rollup = Path("/proc", str(reader.info.writer_pid), "smaps_rollup").read_text()
-        ring_bytes = reader.info.capacity * 256
-    kib = {name: int(value) for name, value in re.findall(r"^(\w+): +(\d+) kB$", rollup, re.MULTILINE)}
-    return {
-        "resident_bytes": 1024 * kib["Rss"],
-        "private_dirty_bytes": 1024 * kib["Private_Dirty"],
-        "ring_bytes": ring_bytes,
-    }
-
-
-# ---------------------------------------------------------------------------------------------------------------------
-# instructions
 
 
 def by_library(profile: str) -> dict[str, int]:
@@ -215,11 +119,7 @@ def columns(text: str) -> dict[str, list[float]]:
 
 def run(build: Path) -> None:
     """Measure what is not measured yet, write results."""
-    times = store.once(CACHE / "cable.json", lambda: cable_times(build))
-    results = {
-        "times_s": {event: {"median": float(np.median(t)), "max": max(t), "n": len(t)} for event, t in times.items()},
-        "memory": store.once(CACHE / "memory.json", lambda: memory(build)),
-    }
+    results: dict = {}
     if shutil.which("valgrind"):
         counts = {
             str(b): store.once(CACHE / f"instructions_{b}.json", lambda b=b: instructions(build, b))

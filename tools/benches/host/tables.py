@@ -62,19 +62,6 @@ def writer() -> str:
     return table(["readers", "they poll, ns", "they wait, us"], lines)
 
 
-def cable() -> str:
-    titles = {"plug": "plug-in to first sample", "unplug": "unplug to error", "replug": "re-plug to samples"}
-    return lined(
-        named(read_result("host")["times_s"], "event"),
-        {
-            "from, to": lambda row: titles[row["event"]],
-            "median, ms": "{median:1e3*.0f}",
-            "longest, ms": "{max:1e3*.0f}",
-            "n": "{n}",
-        },
-    )
-
-
 def instructions() -> str:
     return lined(
         named(read_result("host")["instructions_per_frame"], "batch"),
@@ -85,12 +72,6 @@ def instructions() -> str:
             "share of the netbook": "{atom_share:100*.2f} %",
         },
     )
-
-
-def memory() -> str:
-    found = read_result("host")["memory"]
-    rows = [["resident", "resident_bytes"], ["of it private", "private_dirty_bytes"]]
-    return table(["memory of `whiskerd`", "MB"], [[what, f"{found[key] / 1e6:.1f}"] for what, key in rows])
 
 
 def clock() -> str:

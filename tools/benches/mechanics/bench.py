@@ -1,9 +1,7 @@
-"""Whisker mechanics beside a chain of rigid links in MuJoCo: error of the base moment, natural frequencies, speed.
+"""Whisker mechanics beside a chain of rigid links in MuJoCo: error of the base moment, natural frequencies.
 
 The chain (peers/chain.py) knows nothing of the simulator: an independent reference. Its 20-link results
 are also written to sim/mechanics/tests/reference_table.h, where `make test` compares the simulator with them.
-Speed: 28 whiskers at 2 kHz on one core, 4 against objects all the time, 8 dragged over floors, 16 free; ours and
-MuJoCo's rounds take turns.
 """
 
 import json
@@ -18,12 +16,10 @@ from .edges import write_table as write_edge_table
 from .measure import (
     FINEST,
     ROOT,
-    ROUNDS,
     SMALL_DEG,
     Ours,
     chain,
     measure_modes,
-    measure_speed,
     measure_static,
     mode_cases,
     spec,
@@ -45,7 +41,7 @@ def before_slip(row: dict) -> list[dict]:
     return [p for p in row["points"] if p["theta_deg"] <= 0.95 * min(ends)]
 
 
-def summary(static: list[dict], modes: list[dict], speed: dict) -> dict:
+def summary(static: list[dict], modes: list[dict]) -> dict:
     kept = [p for row in static for p in before_slip(row)]
     hertz = [abs(np.array(r["ours_hz"]) / r["chain_hz"][FINEST] - 1).max() for r in modes]
     return {
@@ -56,7 +52,6 @@ def summary(static: list[dict], modes: list[dict], speed: dict) -> dict:
         "closed_worst_percent_to_5_deg": worst(kept, "closed", SMALL_DEG + 0.1),
         "arc_worst_mm": max(abs(p["arc_mm"]) for p in kept),
         "frequency_worst_percent": 100 * float(max(hertz)),
-        "times_real": {name: round(found["times_real"], 2) for name, found in speed.items()},
     }
 
 
@@ -86,13 +81,12 @@ def write_table(static: list[dict], modes: list[dict]) -> None:
 def run(build: Path) -> None:
     """Measure what is not measured yet. The simulator is the one that tools/build.sh has built."""
     ours = Ours()
-    steps = len(static_cases()) + len(mode_cases()) + ROUNDS + len(HEIGHTS_MM) * len(SPEEDS)
+    steps = len(static_cases()) + len(mode_cases()) + len(HEIGHTS_MM) * len(SPEEDS)
     with tqdm(total=steps, desc="mechanics") as bar:
-        speed = measure_speed(ours, bar)
         modes = measure_modes(ours, bar)
         static = measure_static(ours, bar)
         edges = measure_edges(ours, bar)
-    found = {"summary": summary(static, modes, speed), "edges": edge_summary(edges), "at_edges": edges}
+    found = {"summary": summary(static, modes), "edges": edge_summary(edges), "at_edges": edges}
     found["mujoco"] = chain("modes", spec(0.3e-3, 1.0, 20, pinned_at=0.0))["mujoco"]
     write_table(static, modes)
     write_edge_table(edges)

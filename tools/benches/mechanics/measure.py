@@ -4,7 +4,6 @@ import hashlib
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -19,22 +18,10 @@ CHAIN = store.kept("chain of links", "tools/benches/mechanics/peers", "tools/ben
 
 LINKS = (5, 10, 20)
 FINEST = 80  # links, for frequencies
-ROUNDS = 3
-OURS_S, MUJOCO_S = 20.0, 0.6  # simulated seconds a round
 ANGLES = [2.5, 5.0, 7.5, *np.arange(10, 60, 5).tolist()]
 EXIT, LENGTH, YOUNG, DENSITY = 1.30625e-3, 0.140, 2.5e9, 1200.0
 STOP_FREE = 1e3  # no stop of the plug: MuJoCo's has none
 SMALL_DEG = 5.0
-
-# name -> title, level (MECH_LARGE 1, MECH_VIBRATION 2), sliding contacts, counts
-LEVELS = {
-    "closed": ("closed form (static)", 0, False, False),
-    "large": ("large deflection (elastica)", 1, False, False),
-    "modes": ("large deflection, vibration (modes)", 3, False, False),
-    "large_sliding": ("elastica, contacts slide", 1, True, False),
-    "modes_sliding": ("modes, contacts slide", 3, True, False),
-    "modes_counts": ("modes, noise and counts too", 3, False, True),
-}
 
 
 def cone(tip: float) -> float:
@@ -189,35 +176,3 @@ def measure_modes(ours: Ours, bar) -> list[dict]:
         rows.append(row)
         bar.update()
     return rows
-
-
-def run_scene(ours: Ours, level: str) -> dict:
-    _, bits, sliding, counts = LEVELS[level]
-    setting = {"level": bits, "sliding": sliding, "counts": counts, "tick_s": 500e-6}
-    scene = ours.lib.sim_mechanics_scene_new(ours.ffi.new("struct sim_mechanics_setting *", setting), 11)
-    ours.lib.sim_mechanics_scene_run(scene, 4000)
-    started = time.process_time()
-    ours.lib.sim_mechanics_scene_run(scene, round(OURS_S / 500e-6))
-    spent = time.process_time() - started
-    ours.lib.sim_mechanics_scene_free(scene)
-    return {"times_real": OURS_S / spent}
-
-
-def measure_speed(ours: Ours, bar) -> dict:
-    """Median of rounds in turn; all on one core."""
-    found: dict[str, list[dict]] = {}
-    for turn in range(ROUNDS):
-        for level in LEVELS:
-            found.setdefault(level, []).append(
-                store.once(CACHE / "speed" / f"{level}_{turn}.json", lambda level=level: run_scene(ours, level))
-            )
-        for links in LINKS:
-            name, job = f"mujoco_{links}", spec(0.3e-3, 1.0, links, seconds=MUJOCO_S)
-            found.setdefault(name, []).append(chain("speed", job | {"turn": turn}))
-        bar.update()
-    return {name: median_of(rounds) for name, rounds in found.items()}
-
-
-def median_of(rounds: list[dict]) -> dict:
-    middle = sorted(rounds, key=lambda one: one["times_real"])[len(rounds) // 2]
-    return middle | {"rounds": [one["times_real"] for one in rounds]}

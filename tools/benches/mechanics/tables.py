@@ -2,9 +2,6 @@
 
 from ..store import read_result
 from ..tables import lined, table
-from .measure import LEVELS
-
-TITLES = {name: title for name, (title, *_) in LEVELS.items()}
 
 
 def summary() -> str:
@@ -26,12 +23,6 @@ def summary() -> str:
             ["in these `modes` agrees with 20 links", f"{edges['modes_met']}"],
         ],
     )
-
-
-def speed() -> str:
-    found = read_result("mechanics")["summary"]["times_real"]
-    rows = [[TITLES.get(name, f"MuJoCo, {name[7:]} links"), f"{factor:.3g}"] for name, factor in found.items()]
-    return table(["mechanics", "times real time"], rows)
 
 
 def edges() -> str:

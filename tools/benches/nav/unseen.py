@@ -1,9 +1,7 @@
 """Filters on families of scenes that none of them was made for: arenas, robots, rates, noise and maps of every kind.
 
-    tools/benches nav_unseen --filter grid --seeds 5 --only "two textures"
-
-One line a family: runs locked at the end, error after lock, share of truths within the 90 % region and its area, share
-of rows that are sure (confidence above 0.9) and wrong, and the CPU time of a row. Seeds begin where no development did.
+    tools/benches nav_unseen --filter grid --seeds 5 --only "two textures" Seeds begin where no
+development did.
 """
 
 import argparse
@@ -26,7 +24,6 @@ from crunchbot_lab.scenes.walk import Pace
 
 from .. import store
 
-RESULT = store.RESULTS / "nav_unseen.json"
 FIRST_SEED = 70_000
 ROWS = 600
 SURE, FAR_M, FAR_RAD = 0.9, 0.25, 0.5
@@ -228,16 +225,6 @@ def measure(name: str, start: str, filter: str, settings: dict, seeds: range) ->
     }
 
 
-def line(title: str, r: dict) -> str:
-    cover = "  -  " if r["coverage_90"] is None else f"{r['coverage_90']:5.2f}"
-    area = "   -  " if r["region_90_cm2"] is None else f"{r['region_90_cm2']:6.1f}"
-    return (
-        f"{title:32s} {r['locked']:3d}/{r['runs']:<3d} {r['rows_to_lock']:5.0f} {r['error_mm']:6.1f} mm  cover "
-        f"{cover} {area} cm2"
-        f"  sure+wrong {r['sure_wrong']:.3f}  brier {r['brier']:.3f}  {r['us']:6.1f} us {r['us_p999']:6.0f}"
-    )
-
-
 def run(
     _build: Path,
     filter: str = "adaptive",
@@ -245,7 +232,6 @@ def run(
     first: int = FIRST_SEED,
     only: Sequence[str] = (),
     set: Sequence[str] = (),
-    json: Path = RESULT,
 ) -> None:
     settings = {key: float(value) for key, value in (pair.split("=") for pair in set)}
     done = {}
@@ -255,14 +241,9 @@ def run(
         for start in family.starts:
             title = f"{name}, {STARTS[start][0]}"
             done[title] = measure(name, start, filter, settings, range(first, first + seeds))
-            print(line(title, done[title]), flush=True)
     locked, runs = (sum(r[key] for r in done.values()) for key in ("locked", "runs"))
     print(f"locked {locked} of {runs}, sure and wrong {np.mean([r['sure_wrong'] for r in done.values()]):.4f}")
-    measured = {"filter": filter, "settings": settings, "families": done}
-    if json == RESULT:
-        store.write_result("nav_unseen", measured)
-    else:
-        json.write_text(store.text_of(measured) + "\n")
+    store.write_result("nav_unseen", {"filter": filter, "settings": settings, "families": done})
 
 
 def options(parser: argparse.ArgumentParser) -> None:
@@ -273,4 +254,3 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="of the filter; may be repeated"
     )
-    parser.add_argument("--json", type=Path, default=RESULT, help="where to write (default: %(default)s)")

@@ -1,4 +1,4 @@
-"""Measures the whisker node: random faults, fastest link, skew between nodes, time to the armed record, processor load.
+"""Measures the whisker node: random faults, skew between nodes, time to the armed record, processor load.
 
     .venv/bin/python tools/benches node        bench/results/node.json, node_faults.json and node_cuts.json,
 
@@ -17,18 +17,13 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from whisker_protocol import LIMITS
-
 from .. import store
 
 BATCHES, CHUNK, PROCESSES = 1000, 50, 2
 NODES, TICKS = 28, 10_000
 TICK_CYCLES = 19_300  # of 500 us at the slowest oscillator
 CONVERSION_NS = 350_000  # the sensor's longest in fast mode
-LINK_TICKS = 100
-DIVIDERS = (4, 6, 8, 12, 16, 24, 32)
-WAYS = ("lines", "links")
-PARTS = ("faults", "storm", "link", "skew", "load")
+PARTS = ("faults", "storm", "skew", "load")
 SPREADS = {"equal": (0, 0), "2 %": (20_000, 100), "4 %": (40_000, 100)}  # ppm of chips, permille of sensors
 TOTALS = ("schedules", "ticks", "bad", "missed_line", "missed_link", "displaced", "unexplained", "unforeseen")
 TOTALS += ("spurious", "stuck", "violations", "overwritten")
@@ -53,47 +48,7 @@ def storm(build: Path, kept: Path, batches: int) -> dict:
     with ThreadPoolExecutor(PROCESSES) as pool:
         chunks = list(tqdm(pool.map(chunk, firsts), total=len(firsts), desc="fault schedules"))
     lines = [line for lines in chunks for line in lines]
-    injected = {kind: sum(line["injected"][kind] for line in lines) for kind in lines[0]["injected"]}
-    classes = {way: {name: fate([line[way][name] for line in lines]) for name in lines[0][way]} for way in WAYS}
-    return {name: sum(line[name] for line in lines) for name in TOTALS} | {"injected": injected} | classes
-
-
-def fate(parts: list[list]) -> dict:
-    """A class of damage: how often it passed the checks, and how often it was a good sample then."""
-    return dict(zip(("events", "passed", "good"), np.sum(parts, axis=0).astype(int).tolist(), strict=False))
-
-
-def least(lowest: int, highest: int, step: int, lossless) -> int | None:
-    """The least of lowest, lowest + step ... that loses nothing; all above it lose nothing either."""
-    if not lossless(highest):
-        return None
-    bad, good = lowest - step, highest
-    while good - bad > step:
-        middle = bad + (good - bad) // (2 * step) * step
-        bad, good = (bad, middle) if lossless(middle) else (middle, good)
-    return good
-
-
-def link(build: Path) -> dict:
-    """The fastest settings without loss, on 36 kinds of parts: oscillators, prefetch, DMA."""
-
-    def lost(divider: int, gap: int, period: int) -> int:
-        words = [build / "tests/node/node_link", LINK_TICKS, divider, gap, period]
-        out = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=True).stdout
-        return int(out.split()[0])
-
-    period = LIMITS["tick_period"]
-    gaps = {
-        divider: least(1, LIMITS["word_gap_default"], 1, lambda gap, d=divider: lost(d, gap, period) == 0)
-        for divider in tqdm(DIVIDERS, desc="link")
-    }
-    usual = LIMITS["sck_divider_default"], LIMITS["word_gap_default"]
-    quickest = LIMITS["sck_divider_min"], LIMITS["word_gap_min"]
-    periods = {
-        name: least(18000, period, 20, lambda cycles, s=setting: lost(*s, cycles) == 0)
-        for name, setting in {"default": usual, "fastest": quickest}.items()
-    }
-    return {"ticks": LINK_TICKS, "gap_cycles": gaps, "period_cycles": periods}
+    return {name: sum(line[name] for line in lines) for name in TOTALS}
 
 
 def timing(build: Path, spread: tuple[int, int], ticks=TICKS, nodes=NODES):
@@ -162,7 +117,6 @@ def run(build: Path, only: str = "", batches: int = BATCHES) -> None:
     parts = {
         "faults": lambda: tables(build),
         "storm": lambda: {"storm": storm(build, kept, batches)},
-        "link": lambda: {"link": link(build)},
         "skew": lambda: skew(build),
         "load": lambda: {"load": load(build)},
     }

@@ -1,29 +1,10 @@
 """Tables of docs/results/node_faults.md and node_image.md."""
 
-from whisker_protocol import LIMITS
-
 from ..store import read_result
 from ..tables import lined, named, table
 from .image import HANDLERS
 
 FATES = {1: "the old image", 2: "the loader", 4: "the new image"}
-CLASSES = {
-    "FLIP_BIT": "one bit flipped",
-    "FLIP_TWO": "two bits flipped",
-    "NOISY": "each bit flipped with 1/64 to 1/4",
-    "FLOATING": "line floats",
-    "DEAD": "line dead",
-    "STUCK_LOW": "line stuck low",
-    "ERROR_BITS": "error bits set",
-    "LOST_CLOCK": "one clock lost",
-    "EXTRA_CLOCK": "one clock too many",
-    "BEHIND": "frame begun one bit late",
-    "AHEAD": "frame begun one bit early",
-    "OTHER": "supplies, resets, two at once",
-    "CUT": "1 to 64 clocks missing",
-    "GLITCH": "select glitches",
-    "REARMED": "armed anew amid it",
-} | {f"FLIPS_{n}": f"{n} bit{'s' * (n > 1)} flipped" for n in range(1, 9)}
 MHZ = 38.6925  # instructions a microsecond
 
 
@@ -89,37 +70,6 @@ def storm() -> str:
         "overwritten": "words of the link that its arming displaced amid a transfer at a wrong time, each in a record reported as bad",
     }
     return table(["what", "count"], [[text, f"{found[name]:,}".replace(",", " ")] for name, text in what.items()])
-
-
-def passed(way: str) -> str:
-    return lined(
-        named(read_result("node")["storm"][way], "kind"),
-        {
-            {"lines": "sensor's line", "links": "link"}[way]: lambda row: CLASSES[row["kind"]],
-            "events": "{events}",
-            "passes the sum" if way == "lines" else "passes the CRC": "{passed}",
-            "good sample": "{good}",
-        },
-    )
-
-
-def link() -> str:
-    rows = []
-    for divider, gap in read_result("node")["link"]["gap_cycles"].items():
-        cycle = 1e6 / LIMITS["clock_hz"]
-        us = (
-            [f"{gap}", f"{gap * cycle:.2f}", f"{(64 * int(divider) + 3 * gap) * cycle:.1f}"]
-            if gap
-            else ["none", "", ""]
-        )
-        rows.append([divider, f"{LIMITS['clock_hz'] / int(divider) / 1e6:.2f}", *us])
-    return table(["SCK divider", "MHz", "least word gap, cycles of 60 MHz", "us", "record's transfer, us"], rows)
-
-
-def least_period() -> str:
-    found = read_result("node")["link"]["period_cycles"]
-    rows = [[name, str(n), f"{n * 1e6 / LIMITS['clock_hz']:.0f}"] for name, n in found.items()]
-    return table(["link settings", "least tick period that no node misses, cycles", "us"], rows)
 
 
 def skew() -> str:

@@ -4,14 +4,12 @@ Whiskers are drawn from a batch (stiffness, creep, friction, gain), calibrated w
 judged on others.
 """
 
-import time
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from crunchbot.native import doubles, ffi, lib
 from crunchbot.touch.radial import model as radial
 from crunchbot.touch.radial.shape import shape_of
 from crunchbot.touch.radial.whisk import WhiskModel
@@ -143,56 +141,6 @@ def _stability_of(rows: list) -> dict:
     }
 
 
-def cost() -> dict:
-    """us per contact of each method, from its samples to its estimate, and of its parts; the least of many tries."""
-    cal = recorded(Whisker.drawn(SEED, 0), Kind(SPREADS[1]), FIT, rng_of(40))
-    contact = cal.whisks.recorded[12]
-    samples, t_s = np.ascontiguousarray(contact.samples), np.ascontiguousarray(contact.t_s)
-    given = doubles(t_s, "t_s", (len(samples),)), doubles(samples, "samples", (len(samples), 2))
-    rest = doubles(np.array([32768.0, 32768.0]), "rest", (2,))
-    trace, shape = ffi.new("struct nav_trace *"), ffi.new("struct nav_shape *")
-    estimate_c, model = ffi.new("struct nav_whisk_estimate *"), fitted("whisk", cal)
-    press = fitted("press", cal)
-    line = ffi.new("struct nav_radial *", {"a1": -0.03, "a0": 180.0})
-
-    def trace_all():
-        lib.nav_trace_begin(trace, 2)
-        lib.nav_trace_run(trace, len(t_s), *given, ffi.NULL, ffi.NULL)
-
-    trace_all()
-    lib.nav_shape_of(trace, shape)
-    parts = {
-        "peak": least_us(lambda: lib.nav_radial_peak(given[1], len(samples), 2, rest), 20),
-        "line": least_us(lambda: lib.nav_radial_predict(line, 1500.0), 2000),
-        "trace": least_us(trace_all, 20),
-        "shape": least_us(lambda: lib.nav_shape_of(trace, shape), 500),
-        "estimate": least_us(lambda: lib.nav_whisk_estimate(model._c, shape, estimate_c), 500),
-    }
-    whole = parts["trace"] + parts["shape"] + parts["estimate"]
-    return {
-        "samples": len(t_s),
-        "parts_us": parts,
-        "contact_us": {
-            "paper": parts["peak"] + parts["line"],
-            "whisk": whole,
-            "press": least_us(lambda: radial.estimate(press, contact), 5),
-        },
-        "sample_us": parts["trace"] / len(t_s),
-        "release_us": parts["shape"] + parts["estimate"],
-    }
-
-
-def least_us(call, repeats: int, tries: int = 60) -> float:
-    """Least mean time of a call, us: the machine may be busy with other things."""
-    best = np.inf
-    for _ in range(tries):
-        begun = time.perf_counter()
-        for _ in range(repeats):
-            call()
-        best = min(best, (time.perf_counter() - begun) / repeats)
-    return 1e6 * best
-
-
 def fig5() -> dict:
     """The paper's calibration of four whiskers: 5 whisks at each radius, its standard errors, and one line for all."""
     points, all_peaks, all_radii = [], [], []
@@ -247,7 +195,6 @@ def draw_fig5(results: dict) -> Figure:
 def run(_build: Path) -> None:
     """Measure what is not yet measured, and redraw. The C library comes with the Python module."""
     results = sweep(measured, {name: {"part": name} for name in PARTS}, CACHE, label="radial")
-    results["cost"] = store.once(CACHE / "cost.json", cost)  # not beside the others, for it measures time
     points = results["fig5"]["whiskers"]
     kept = results | {
         "fig5": {"combined_mm": results["fig5"]["combined_mm"], "error_mm": [w["error_mm"] for w in points]}

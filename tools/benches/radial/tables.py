@@ -54,19 +54,6 @@ def honesty() -> str:
     return table(["figure", *SPREADS.values()], [*rows, ["tip or shaft right, default (eq. 3)", *shares]])
 
 
-def cost() -> str:
-    found = read_result("radial")["cost"]
-    rows = [
-        ["`whisk`, a sample", f"{found['sample_us']:.3f}"],
-        ["`whisk`, when a contact ends", f"{found['release_us']:.2f}"],
-        *(
-            [f"`{name}`, all of a contact of {found['samples']} samples", f"{us:.1f}"]
-            for name, us in found["contact_us"].items()
-        ),
-    ]
-    return table(["model", "us"], rows)
-
-
 def stability() -> str:
     def answer(one: dict) -> str:
         return f"{one['error_mm']:.1f}, {one['sigma_mm']:.1f}, {one['confidence']:.2f}"

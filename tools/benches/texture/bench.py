@@ -17,16 +17,16 @@ from tqdm import tqdm
 
 from .. import store
 from .cost import cost
-from .real import boreal, boreal_left_out, fabrics, fabrics_left_out, vulpi_left_out, vulpi_terrains
-from .simulated import borders, floors_left_out, other_robot, refusals, single_surfaces, stability
+from .real import boreal, fabrics, vulpi_terrains
+from .simulated import borders, other_robot, refusals, single_surfaces, stability
 
 CACHE = store.kept("texture")
-FLOORS = (cost, single_surfaces, other_robot, borders, refusals, floors_left_out, stability)
+FLOORS = (cost, single_surfaces, other_robot, borders, refusals, stability)
 PARTS = {f.__name__: f for f in FLOORS}
 REAL = {  # by the folder that is given
-    "fabricslide": {"fabricslide": fabrics, "fabrics_left_out": fabrics_left_out},
-    "borealtc": {"borealtc": boreal, "boreal_left_out": boreal_left_out},
-    "vulpi": {"vulpi": vulpi_terrains, "vulpi_left_out": vulpi_left_out},
+    "fabricslide": {"fabricslide": fabrics},
+    "borealtc": {"borealtc": boreal},
+    "vulpi": {"vulpi": vulpi_terrains},
 }
 
 

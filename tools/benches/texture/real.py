@@ -11,7 +11,7 @@ from crunchbot.touch.texture.model import TextureModel, posterior
 from crunchbot.touch.texture.train import calibration_error, train
 
 from .cost import peers
-from .scores import METHODS, detected, refusal_cut
+from .scores import METHODS, refusal_cut
 from .trials import borealtc, fabricslide, vulpi
 
 FABRIC_HZ = 35.6
@@ -44,30 +44,12 @@ def trial_decisions(kept: dict, held: list, window_ms: float) -> dict[str, list[
     }
 
 
-def fabrics_left_out(folder: Path) -> dict:
-    """Each fabric left out of training in turn; windows as long as the shortest trial."""
-    trials = fabricslide(folder)
-    shortest = min(len(x) for *_, x in trials)
-    fold = np.array([w["repeat"] % FOLDS for _, w, _ in trials])
-    return left_out([(n, x) for n, _, x in trials], fold, FABRIC_HZ, shortest, held=(0,))
-
-
 def boreal(folder: Path) -> dict:
     return terrains(borealtc(folder), BOREAL_HZ)
 
 
-def boreal_left_out(folder: Path) -> dict:
-    runs = borealtc(folder)
-    return left_out(runs, folds_of(runs), BOREAL_HZ, round(TERRAIN_S * BOREAL_HZ))
-
-
 def vulpi_terrains(folder: Path) -> dict:
     return terrains(vulpi(folder), VULPI_HZ)
-
-
-def vulpi_left_out(folder: Path) -> dict:
-    runs = vulpi(folder)
-    return left_out(runs, folds_of(runs), VULPI_HZ, round(TERRAIN_S * VULPI_HZ))
 
 
 def folds_of(runs: list) -> np.ndarray:
@@ -110,33 +92,6 @@ def peer_decisions(kept: list, held: list, names: list[str], window: int, floor:
         name: [(int(np.argmax(p)) == k, True, float(np.max(p))) for p, k in zip(chances, truth, strict=True)]
         for name, chances in peers(arrays, "risk.py").items()
     }
-
-
-def left_out(runs: list, fold: np.ndarray, hz: float, window: int, held: tuple = (0, 2)) -> dict:
-    """Each surface left out of training in turn, and a fold of the others: shares refused from the fifth window on."""
-    out = {}
-    for surface in tqdm(sorted({n for n, _ in runs}), desc="surfaces left out"):
-        untrained, trained, found = [], [], []
-        for f in held:
-            kept = group((n, x) for (n, x), at in zip(runs, fold, strict=True) if at != f and n != surface)
-            model = train(kept, hz, 1000.0 * window / hz)
-            for (n, x), at in zip(runs, fold, strict=True):
-                if n == surface or at == f:
-                    refused = [d.label < 0 for d in model.judge(x, window)[ROW:]]
-                    (untrained if n == surface else trained).extend(refused)
-            parts = [
-                group(r for r, at in zip(runs, fold, strict=True) if (at == f) == out and len(r[1]) >= window)
-                for out in (False, True)
-            ]
-            found.append(detected(*parts, surface, window))
-        out[surface] = {
-            "refused": np.mean(untrained),
-            "windows": len(untrained),
-            "detected": np.mean(found),
-            "trained_refused": np.mean(trained),
-            "trained_windows": len(trained),
-        }
-    return out
 
 
 def windows_of(x: np.ndarray, window: int) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from crunchbot.touch.texture.classifier import plain_features
 from crunchbot.touch.texture.model import TextureModel, classify
 from crunchbot.touch.texture.spectral import SpectralModel
 from crunchbot.touch.texture.train import calibration_error, train
@@ -28,34 +27,6 @@ def decide(model, samples: np.ndarray, window: int = WINDOW, sequential: bool = 
         d.best = model.classes.index(d.best)
         d.number = model.classes.index(d.label) if d.label in model.classes else -1
     return found
-
-
-def detected(kept: dict, held: dict, surface: str, window: int) -> float:
-    """What a detector that was trained on the surface too, by the default's features, finds of its windows from the
-    fifth of a recording on, when it takes at most REFUSED_MOST of the others' for it: a linear discriminant of the mean
-    of windows so far.
-    """
-    floor = np.zeros(next(iter(kept.values()))[0].shape[1])
-    rows = {
-        part: [(name == surface, _means(x, window, floor)) for name, group in of.items() for x in group]
-        for part, of in (("kept", kept), ("held", held))
-    }
-    mine, others = (np.concatenate([x for is_it, x in rows["kept"] if is_it == which]) for which in (True, False))
-    within = 0.5 * (np.cov(mine.T) + np.cov(others.T))
-    within = (1.0 - SHRINK) * within + SHRINK * np.diag(np.diag(within)) + 1e-9 * np.eye(len(within))
-    direction = np.linalg.solve(within, mine.mean(axis=0) - others.mean(axis=0))
-    scores = {
-        which: np.concatenate([x[4:] @ direction for is_it, x in rows["held"] if is_it == which])
-        for which in (True, False)
-    }
-    return float((scores[True] > np.quantile(scores[False], 1.0 - REFUSED_MOST)).mean())
-
-
-def _means(samples: np.ndarray, window: int, floor: np.ndarray) -> np.ndarray:
-    """Features of each of a recording's windows, averaged over those so far."""
-    cut = samples[: len(samples) // window * window].reshape(-1, window, samples.shape[1])
-    features = plain_features(cut, False, floor)
-    return np.cumsum(features, axis=0) / np.arange(1, len(features) + 1)[:, None]
 
 
 def summary(pairs: list[tuple[int, object]]) -> dict:

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from .scores import METHODS, WINDOW, decide, detected, models, strip_score, strip_scores, summary
+from .scores import METHODS, WINDOW, decide, models, strip_score, strip_scores, summary
 from .trials import SURFACES, closer, drives, faults, strips
 
 TRAIN_SEED, TEST_SEEDS, STRIP_SEEDS, OTHER_ROBOT = 6000, (6001, 6002), range(6100, 6115), 6050
@@ -63,27 +63,6 @@ def never_trained(tests: dict) -> dict[str, list]:
         for name, model in rest.items():
             found[name] += [(-2, d) for r in tests[left_out] for d in decide(model, r)]
     return found
-
-
-def floors_left_out() -> dict:
-    """Each surface left out of training in turn: shares refused from the fifth window of a drive on."""
-    out = {}
-    for left_out in SURFACES:
-        model = models({k: v for k, v in drives(TRAIN_SEED, TRAIN_SEED).items() if k != left_out})[METHODS[1]]
-        refused = {
-            k: [d.number < 0 for seed in TEST_SEEDS for r in drives(seed, TRAIN_SEED)[k] for d in decide(model, r)[4:]]
-            for k in SURFACES
-        }
-        others = np.concatenate([refused[k] for k in SURFACES if k != left_out])
-        held = {k: [r for seed in TEST_SEEDS for r in drives(seed, TRAIN_SEED)[k]] for k in SURFACES}
-        out[left_out] = {
-            "refused": np.mean(refused[left_out]),
-            "windows": len(refused[left_out]),
-            "detected": detected(drives(TRAIN_SEED, TRAIN_SEED), held, left_out, WINDOW),
-            "trained_refused": others.mean(),
-            "trained_windows": len(others),
-        }
-    return out
 
 
 def half_and_half(tests: dict) -> list[tuple[int, np.ndarray]]:

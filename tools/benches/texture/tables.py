@@ -91,25 +91,3 @@ def peers() -> str:
             "area": "{area_under_risk_coverage:100*.2f}",
         },
     )
-
-
-def untrained() -> str:
-    found = read_result("texture")
-    parts = {
-        "simulated floors, 100 ms": "floors_left_out",
-        "FabricSlide, 4 s": "fabrics_left_out",
-        "BorealTC, 1.7 s": "boreal_left_out",
-        "Vulpi, 1.7 s": "vulpi_left_out",
-    }
-    return lined(
-        named({title: found[part] for title, part in parts.items() if part in found}, "recordings", "surface"),
-        {
-            "recordings": "{recordings}",
-            "left out": "{surface}",
-            "it is refused": "{refused:100*.1f}",
-            "detected": "{detected:100*.1f}",
-            "windows": "{windows}",
-            "trained ones are refused": "{trained_refused:100*.1f}",
-            "of windows": "{trained_windows}",
-        },
-    )
