@@ -142,8 +142,7 @@ complete -c whisker -n '__fish_seen_subcommand_from robot' -l view-port -d '(802
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l out -d 'logs, bag, truth (robot-run)' -r
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l no-view -d 'no page for a browser'
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l seed -d 'of turns and simulation (1)' -x
-complete -c whisker -n '__fish_seen_subcommand_from robot' -l choose -d 'turns and distances: at random; plan: by what the navigator'\''s belief is expected to gain; map: to new floor, by a map of the pilot'\''s own; check: to the tile of --tile, by that belief; along walls; in lanes (random); plan and check need --desktop here, or a navigator' -x -a 'random plan map check wall lanes'
-complete -c whisker -n '__fish_seen_subcommand_from robot' -l tile -d 'for --choose check: the tile, 0,0 at x = y = 0 (the one that the windows say most against)' -x
+complete -c whisker -n '__fish_seen_subcommand_from robot' -l choose -d 'turns and distances: at random, or map: to new floor, by a map of the pilot'\''s own (random)' -x -a 'random map'
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l listen -d 'be reached at this address, by anyone who reaches it (default: this machine only)' -x
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l first-port -d 'of three, for supervisor, pilot and navigator (default: 7457)' -x
 complete -c whisker -n '__fish_seen_subcommand_from robot' -l zenoh-config -d 'zenoh'\''s own configuration (JSON5): TLS and access control, see docs/remote.md; endpoints become tls/ADDRESS:PORT' -r
@@ -161,8 +160,7 @@ complete -c whisker -n '__fish_seen_subcommand_from pilot' -l ring-owner -d 'acc
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l base -d 'of whisker-base' -x
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l simulation -d 'of a simulation that waits for the pilot; without --base its wheels are driven directly' -x
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l seed -d 'of the random turns (default: 1)' -x
-complete -c whisker -n '__fish_seen_subcommand_from pilot' -l choose -d 'turns and distances: at random; plan: by what the navigator'\''s belief is expected to gain; map: to new floor, by a map of the pilot'\''s own; check: to the tile of --tile, by that belief; along walls; in lanes (random)' -x -a 'random plan map check wall lanes'
-complete -c whisker -n '__fish_seen_subcommand_from pilot' -l tile -d 'for --choose check: the tile, 0,0 at x = y = 0 (the one that the windows say most against)' -x
+complete -c whisker -n '__fish_seen_subcommand_from pilot' -l choose -d 'turns and distances: at random, or map: to new floor, by a map of the pilot'\''s own (random)' -x -a 'random map'
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l robot -d 'which robot (default: robot)' -x
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l listen -d 'endpoint to be reached at, tcp/HOST:PORT or tls/HOST:PORT; repeatable, or '\''none'\'' (default: tcp/127.0.0.1:7458)' -x
 complete -c whisker -n '__fish_seen_subcommand_from pilot' -l connect -d 'endpoint of another process, tcp/HOST:PORT or tls/HOST:PORT; repeatable, or '\''none'\'' (default: tcp/127.0.0.1:7459)' -x

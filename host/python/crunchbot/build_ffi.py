@@ -52,7 +52,6 @@ HEADERS = {
             "filter/weigh.h",
             "mapping/mapper.h",
             "planning/coverage.h",
-            "planning/planner.h",
         )
     ],
     "whisker": [

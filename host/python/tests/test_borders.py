@@ -22,10 +22,7 @@ from crunchbot.native import as_doubles, doubles, ffi, lib, octets
 from crunchbot.nav.filters import COMPONENT, Filter, Sensor, pack, prior_fault
 from crunchbot.nav.mapper import Mapper
 from crunchbot.nav.weigher import Weigher
-from crunchbot.planning.actions import Vehicle
-from crunchbot.planning.coverage import CoveragePlanner, Field
-from crunchbot.planning.ground import ArenaMap, Ground
-from crunchbot.planning.planner import Past, Planner
+from crunchbot.planning.coverage import CoveragePlanner, Field, Vehicle
 from crunchbot.touch.contact import Contact
 from crunchbot.touch.contact_filter import ContactFilter
 from crunchbot.touch.radial.model import RadialModel, peak
@@ -94,9 +91,8 @@ COMPONENTS["pose"], COMPONENTS["sigma_m"], COMPONENTS["sigma_rad"], COMPONENTS["
 PLAIN = TextureModel.train({"A": [NOISE], "B": [3.0 * NOISE]})
 WHISK = {"t_s": np.arange(64.0), "samples": NOISE[:64], "whisk_rad_s": np.ones(64), "reported_rad_s": np.ones(64)}
 PUSH = {"bases": np.zeros((8, 3)), "tilts": np.zeros((8, 2)), "good": np.ones(8, bool)}
-GROUND, VEHICLE = Ground.of(ArenaMap(SCENE.arena), SCENE.robot), Vehicle(0.15, 0.71, 0.5, 4.0, 0.25)
+VEHICLE = Vehicle(0.15, 0.71, 0.5, 0.25)
 FIELD = Field(0.1, 0.0, 0.0, np.ones((5, 6), np.float32), np.ones((5, 6), np.uint8))
-PAST = {"met": np.zeros((2, 2)), "been": np.zeros((3, 3))}
 BLOCK = {"ticks": np.arange(8), "samples": NOISE[:8], "good": np.ones(8, bool)}
 
 CASES = {
@@ -134,15 +130,6 @@ CASES = {
         {"asides_m": np.zeros(3)},
         {"asides_m": ()},
     ),
-    "planning.planner._ground": Case(
-        lambda **cells: Planner(dataclasses.replace(GROUND, **cells), VEHICLE),
-        {"texture": GROUND.texture, "clear_m": GROUND.clear_m},
-        {"texture": (0, 1), "clear_m": (0, 1)},
-    ),
-    "planning.planner.Planner.plan": Case(
-        lambda **past: Planner(GROUND, VEHICLE).plan(COMPONENTS, Past(**past)), PAST, {"met": (1,), "been": (1,)}
-    ),
-    "planning.planner.Planner.whisk": of_one(Planner(GROUND, VEHICLE).whisk, "components", COMPONENTS),
     "touch.contact.Contact.block": Case(
         lambda **block: Contact().block(*block.values()), BLOCK, {"ticks": (0,), "samples": (0, 1), "good": (0,)}
     ),

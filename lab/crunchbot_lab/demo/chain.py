@@ -17,6 +17,7 @@ from pathlib import Path
 from crunchbot.pilot.behaviour import BLOCK_TICKS
 from crunchbot.robot.network import link as network
 from crunchbot.robot.network.truth import TruthWatcher
+from crunchbot.robot.policy import RANDOM
 from crunchbot.robot.processes import parts
 from crunchbot.robot.processes.children import Child, Program
 
@@ -59,7 +60,7 @@ class ChainRun:
     filters: tuple[str, ...] = FILTERS
     known: Path | None = None  # scene folder that the navigator is given; None: that of the world
     map_folder: Path | None = None  # a mapper in the navigator's place writes it
-    choice: parts.Choice = parts.Choice()  # of turns and drives
+    choose: str = RANDOM  # of turns and drives
     before: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # by a program's name: words before its own
 
     @property
@@ -105,7 +106,7 @@ def run_chain(run: ChainRun, progress: Callable[[int], None]) -> float:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="whisker-")))
         stack.callback(_remove_ring, ring)
         places = Places(ring, folder, *_free_endpoints(3))
-        body = parts.Body(run.scene, run.out / "models", run.create, places.serial, run.seed, run.choice)
+        body = parts.Body(run.scene, run.out / "models", run.create, places.serial, run.seed, run.choose)
         table = parts.Table(body, places, run.program)
         bridge = Child(_bridge(run, table), run.logs / "bridge.log", _ticks(progress))
         children = [stack.enter_context(closing(bridge))]

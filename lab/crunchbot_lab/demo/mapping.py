@@ -22,7 +22,6 @@ from crunchbot.nav import localise
 from crunchbot.nav.scoring import lock_row
 from crunchbot.occupancy import to_map
 from crunchbot.robot.policy import MAP
-from crunchbot.robot.processes import parts
 
 from ..report import map_page
 from ..scenes import map_scoring
@@ -71,7 +70,7 @@ def demonstrate(options: argparse.Namespace) -> dict:
     results = {"seed": options.seed, "simulated_s": options.seconds, "again_s": options.again, "lanes": options.lanes}
     explore = folder_of(out / "explore", scene, start)
     learn_models(explore, scene, options)
-    first = chain_of(explore, options, options.level, map_folder=out / "map", choice=parts.Choice(MAP))
+    first = chain_of(explore, options, options.level, map_folder=out / "map", choose=MAP)
     results["explore"] = simulate(first)
     results["map"] = judge_map(out, scene)
     again = folder_of(out / "again", scene, draw_start(scene.arena, np.random.default_rng([options.seed, 2])))

@@ -18,13 +18,12 @@ from ..pilot.base import Base
 from ..pilot.pilot import Pilot
 from ..pilot.wheels import EXACT, Wheels
 from ..robot.blocks import LiveRing
-from ..robot.choosing import add_choices, refuse_tile
 from ..robot.models import check_nodes, load_models
 from ..robot.network.health import Health
 from ..robot.network.link import Link
 from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
 from ..robot.pilot_process import Flight, LiveFlight, LiveWheels, fly_in_step
-from ..robot.policy import choices_of, taker_of
+from ..robot.policy import add_choices, choices_of
 from ..robot.processes.lifeline import Heartbeat
 from ..robot.publisher import Publisher
 from ..robot.rowfiles import Rows, Traces
@@ -51,7 +50,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "scene",
         type=Path,
         metavar="SCENE",
-        help="scene folder, of which robot.toml is read, and with --choose plan or check the arena",
+        help="scene folder, of which robot.toml is read",
     )
     parser.add_argument("--models", type=Path, required=True, help="folder with texture.json and <whisker>.json")
     parser.add_argument("--nodes", help="what 'whisker info --nodes' printed: models of other nodes are refused")
@@ -61,7 +60,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "of a simulation that waits for the pilot; without --base its wheels are driven directly"
     parser.add_argument("--simulation", metavar="SOCKET", help=text)
     parser.add_argument("--seed", type=whole_number(0), default=1, help="of the random turns (default: %(default)s)")
-    add_choices(parser, "")
+    add_choices(parser)
     add_link(parser, [PILOT_ENDPOINT], [NAVIGATOR_ENDPOINT])
     parser.add_argument(
         "--await", action="append", default=[], dest="others", metavar="PROCESS", help="begin when it is there, too"
@@ -73,7 +72,6 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    refuse_tile(arguments)
     if not (arguments.base or arguments.simulation):
         raise UserError("pilot: no wheels; give --base SOCKET, or --simulation SOCKET")
     with ExitStack() as stack:
@@ -103,8 +101,8 @@ def _body(arguments) -> tuple:
 def _parts(arguments, body: tuple, link: Link, wheels: Wheels, stack: ExitStack) -> SimpleNamespace:
     scene, texture, radial = body
     pilot = Pilot(scene.robot, texture, radial, arguments.seed, wheels)
-    taker, random = taker_of(arguments.choose, scene, link, arguments.seed), pilot.behaviour.choices
-    pilot.behaviour.choices = choices_of(arguments.choose, scene, taker, random, arguments.tile)
+    made = choices_of(arguments.choose, scene.robot, arguments.seed, pilot.behaviour.choices)
+    pilot.behaviour.choices, taker = made
     out = stack.enter_context(open(arguments.out, "w", newline=""))  # noqa: SIM115
     traces = stack.enter_context(open(arguments.traces, "w", newline=""))  # noqa: SIM115
     parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "publisher": Publisher(link, pilot, taker)}

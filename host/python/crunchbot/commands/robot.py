@@ -10,12 +10,11 @@ from ..arguments import RING, add_zenoh_config, number_above, whole_number
 from ..errors import UserError
 from ..lab import import_lab
 from ..progress import bar
-from ..robot.choosing import add_choices, refuse_tile
 from ..robot.models import load_models
 from ..robot.network.link import read_config
 from ..robot.network.options import link_that_warns
 from ..robot.network.truth import TruthWatcher
-from ..robot.policy import KNOW_ARENA
+from ..robot.policy import add_choices
 from ..robot.processes import holders, parts
 from ..robot.processes.logs import run_folder
 from ..robot.processes.supervisor import Supervisor
@@ -47,7 +46,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--no-view", action="store_true", help="no page for a browser")
     parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of turns and simulation (1)")
-    add_choices(parser, "; plan and check need --desktop here, or a navigator")
+    add_choices(parser)
     text = "be reached at this address, by anyone who reaches it (default: this machine only)"
     parser.add_argument("--listen", default=parts.LOOPBACK, metavar="ADDRESS", help=text)
     text = "of three, for supervisor, pilot and navigator (default: %(default)s)"
@@ -69,9 +68,6 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     arguments.desktop |= arguments.map
-    refuse_tile(arguments)
-    if arguments.map and arguments.choose in KNOW_ARENA:
-        raise UserError(f"robot: --map with --choose {arguments.choose}: it needs a known arena; choose another")
     if arguments.units:
         return _write_units(arguments)
     stop = stop_on_signals()
@@ -99,7 +95,7 @@ def _write_units(arguments) -> int:
     address = (arguments.listen, arguments.first_port, arguments.zenoh_config and arguments.zenoh_config.resolve())
     meeting = Installed(arguments.ring, arguments.units, *address, port=arguments.port)
     scene, models = arguments.scene.resolve(), arguments.models.resolve()
-    body = parts.Body(scene, models, arguments.create, arguments.port, arguments.seed, _choice(arguments))
+    body = parts.Body(scene, models, arguments.create, arguments.port, arguments.seed, arguments.choose)
     table = [program for program in parts.netbook(body, meeting, _awaited(arguments)) if program.name != "base"]
     if arguments.desktop:
         view = None if arguments.no_view else arguments.view_port
@@ -144,7 +140,7 @@ def _table(arguments, meeting: parts.Meeting) -> list:
         table = [parts.bridge(simulated, body, meeting)]
     else:
         body = parts.Body(
-            arguments.scene, arguments.models, arguments.create, arguments.port, arguments.seed, _choice(arguments)
+            arguments.scene, arguments.models, arguments.create, arguments.port, arguments.seed, arguments.choose
         )
         table = []
     if arguments.desktop:
@@ -154,10 +150,6 @@ def _table(arguments, meeting: parts.Meeting) -> list:
     if not arguments.no_daemon:
         table.append(parts.daemon(body, meeting, arguments.simulated))
     return table + parts.netbook(body, meeting, _awaited(arguments))
-
-
-def _choice(arguments) -> parts.Choice:
-    return parts.Choice(arguments.choose, arguments.tile)
 
 
 def _awaited(arguments) -> str | None:
@@ -182,6 +174,6 @@ def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Sim
         with bar(total=models_wanted, desc="models", unit="model", disable=None) as done:
             result = kept.learn_or_copy(models, scene, seed, lambda: done.update(1))
         print(f"models: {result}", flush=True)
-    body = parts.Body(folder, models, arguments.create, meeting.serial, seed, _choice(arguments))
+    body = parts.Body(folder, models, arguments.create, meeting.serial, seed, arguments.choose)
     reported = (arguments.level, seed, arguments.seconds, arguments.pace, out / "truth.csv", out / "wheels.csv")
     return body, parts.Simulated(out / "scene.flat", *reported)

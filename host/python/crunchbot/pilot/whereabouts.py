@@ -30,14 +30,14 @@ class Whereabouts:
 
     def __init__(self):
         self._x = self._y = self._theta = 0.0
-        self._path: deque[tuple[int, float, float, float]] = deque()
+        self._path: deque[tuple[int, float, float]] = deque()
         self._met: list[Encounter] = []
 
     def moved(self, tick: int, dx: float, dy: float, dtheta: float) -> None:
         """Reported motion in the robot's frame at its start (m, m, rad)."""
         c, s = math.cos(self._theta), math.sin(self._theta)
         self._x, self._y, self._theta = self._x + c * dx - s * dy, self._y + s * dx + c * dy, self._theta + dtheta
-        self._path.append((tick, self._x, self._y, self._theta))
+        self._path.append((tick, self._x, self._y))
         while self._path and self._path[0][0] <= tick - self.MEMORY_TICKS:
             self._path.popleft()
         self._met = [m for m in self._met if m.tick > tick - self.MEMORY_TICKS]
@@ -52,11 +52,6 @@ class Whereabouts:
         """Those after tick `since` with the robot within this distance of here, the oldest first."""
         return [m for m in self._met if m.tick > since and math.hypot(m.x_m - self._x, m.y_m - self._y) < radius_m]
 
-    @property
-    def place(self) -> tuple[float, float]:
-        """Where it is, in the start's frame, m."""
-        return self._x, self._y
-
     def things(self) -> np.ndarray:
         """(m, 2) places of what was met, in the robot's frame, m."""
         return self._from_here(np.array([(m.thing_x_m, m.thing_y_m) for m in self._met]).reshape(-1, 2))
@@ -66,9 +61,8 @@ class Whereabouts:
         return self._from_here(np.array([(m.x_m, m.y_m) for m in self._met]).reshape(-1, 2))
 
     def been(self) -> np.ndarray:
-        """(n, 3) poses in which the robot was at its reports, in its present frame: m, m, rad."""
-        path = np.array(self._path).reshape(-1, 4)
-        return np.column_stack([self._from_here(path[:, 1:3]), path[:, 3] - self._theta])
+        """(n, 2) where the robot was at its reports, likewise."""
+        return self._from_here(np.array(self._path).reshape(-1, 3)[:, 1:])
 
     def _from_here(self, points: np.ndarray) -> np.ndarray:
         c, s = math.cos(self._theta), math.sin(self._theta)
@@ -88,5 +82,5 @@ class Whereabouts:
 
     def lingered(self, tick: int, radius_m: float) -> int:
         """Ticks since the robot was last further than this from where it is."""
-        away = (t for t, x, y, _ in reversed(self._path) if math.hypot(x - self._x, y - self._y) > radius_m)
+        away = (t for t, x, y in reversed(self._path) if math.hypot(x - self._x, y - self._y) > radius_m)
         return tick - next(away, self._path[0][0] if self._path else tick)

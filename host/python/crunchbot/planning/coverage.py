@@ -1,7 +1,6 @@
 """The way over a map, as it stands, that sweeps most new floor a second: host/nav/planning/coverage for Python.
 
-What is open comes from a map that grows (`of_growing`) or from ground that is known (`of_known`). Ground that nobody knows may be
-driven on, and may stop the robot.
+What is open comes from a map that grows (`of_growing`). Ground that nobody knows may be driven on, and may stop the robot.
 """
 
 import math
@@ -13,10 +12,10 @@ import numpy as np
 
 from ..native import doubles, ffi, floats, lib, octets
 from ..scene import Robot
-from .actions import Vehicle
-from .ground import LIKELY, Ground, clearance, reach
+from .clearance import clearance, reach
 
 CELL_M = 0.05
+LIKELY = 0.5  # probability from which a place counts as occupied
 BUDGET = 15_000  # states: 20 ms of the paper's netbook
 MARGIN_M = 0.6  # of ground around what is known
 BEEN_M = 0.05  # from where the robot's middle was: nothing stood there
@@ -61,6 +60,21 @@ class Growing(Protocol):
     def axes(self) -> float | None: ...
     @property
     def frame(self) -> int: ...
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """Speeds, m/s and rad/s; what a contact costs, s; `settle_s` after each change of speed."""
+
+    drive_m_s: float
+    turn_rad_s: float
+    contact_s: float
+    settle_s: float
+
+    @property
+    def stopped_s(self) -> float:
+        """What it costs to be stopped: the way back, and a quarter turn away, for the way ahead is closed."""
+        return self.contact_s + math.pi / 2.0 / self.turn_rad_s + 2.0 * self.settle_s
 
 
 @dataclass(frozen=True)
@@ -269,30 +283,3 @@ def _near(open_: np.ndarray, here: np.ndarray, low: np.ndarray) -> np.ndarray:
     """(rows, columns) bool: where it may drive, for it came there, whatever the map says."""
     x, y = _middles(open_.shape, low)
     return (x - here[0]) ** 2 + (y - here[1]) ** 2 < LEAVE_M**2
-
-
-def of_known(ground: Ground, fresh: np.ndarray, met: np.ndarray, pose: np.ndarray) -> Field:
-    """What a known ground says to a robot at pose (3,), where `fresh` (rows, columns of the ground) bool is to be read; its cells are
-    about CELL_M wide. Of what was met, `met` as of `of_growing`, what the ground has already is no news."""
-    by, low = max(1, round(CELL_M / ground.cell_m)), np.full(2, ground.corner_m)
-    rows, columns = (side // by * by for side in ground.clear_m.shape)
-
-    def blocks(cells: np.ndarray) -> np.ndarray:
-        return cells[:rows, :columns].reshape(rows // by, by, columns // by, by)
-
-    clear = blocks(ground.clear_m).min(axis=(1, 3))
-    open_ = np.where(clear < reach(ground.robot), TOUCHED, 1.0)
-    fits = clear >= ground.robot.body_radius_m
-    away = _near(open_, pose, low) & (clear >= _at(ground, pose[None, :2])[0])  # it stands there, so it gets away
-    np.putmask(open_, ~(fits | away), 0.0)
-    bars = met[:, 2:] + STOPPED_M * _directions(met[:, 2:], met[:, :2])
-    _close_at(open_, bars[_at(ground, bars) > reach(ground.robot)], low)
-    wanted = blocks(fresh).mean(axis=(1, 3)) > 0.5
-    return Field(by * ground.cell_m, *map(float, low), open_.astype(np.float32), wanted.astype(np.uint8))
-
-
-def _at(ground: Ground, points: np.ndarray) -> np.ndarray:
-    """(n,) clearance at points (n, 2)."""
-    most = np.array(ground.clear_m.shape[::-1]) - 1
-    column, row = np.clip((points - ground.corner_m) / ground.cell_m, 0, most).astype(int).T
-    return ground.clear_m[row, column]

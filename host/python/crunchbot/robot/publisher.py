@@ -11,7 +11,7 @@ from .network import messages
 from .network.link import Link
 from .network.ros import BASE_FRAME, ODOMETRY_FRAME
 from .network.rows import ROW_NS, RowPublisher, compose
-from .policy import RowTaker
+from .policy import OwnMap
 from .wheels import Report
 
 TICK_NS = round(TICK_S * 1e9)
@@ -24,7 +24,7 @@ TOPICS = ("odometry", "joints", "contact", "behaviour")
 class Publisher:
     """Publishes what a pilot does; `block` after each of its blocks, `row` after each of its rows."""
 
-    def __init__(self, link: Link, pilot: Pilot, taker: RowTaker | None = None):
+    def __init__(self, link: Link, pilot: Pilot, taker: OwnMap | None = None):
         """`taker`: is to know of every row that is sent."""
         self._taker = taker
         self._pilot, self._streams = pilot, {topic: link.publish(topic) for topic in TOPICS}
@@ -51,9 +51,9 @@ class Publisher:
 
     def row(self, row: Row, report: Report, samples: np.ndarray) -> None:
         """The row of the 0.1 s that end with the newest block, and the odometry and samples (lanes,) at its end."""
-        sent = self._rows.send(row)
+        self._rows.send(row)
         if self._taker:
-            self._taker.row(sent.seq, sent.pose, row)
+            self._taker.row(row)
         self._send("odometry", self._odometry(report))
         self._send("joints", self._joints(samples))
 

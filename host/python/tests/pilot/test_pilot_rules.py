@@ -269,8 +269,8 @@ def test_where_it_has_been_is_in_its_own_frame():
     here.meet(200, 0.0)
     here.moved(400, 0.0, 0.0, math.pi / 2)
     assert here.things() == pytest.approx(np.array([[0.0, -0.2]]), abs=1e-12)
-    assert here.been() == pytest.approx(np.array([[0.0, 0.0, -math.pi / 2], [0.0, 0.0, 0.0]]), abs=1e-12)
-    assert here.place == (1.0, 0.0)
+    here.moved(600, 0.5, 0.0, 0.0)
+    assert here.been() == pytest.approx(np.array([[-0.5, 0.0], [-0.5, 0.0], [0.0, 0.0]]), abs=1e-12)
 
 
 # The tip.

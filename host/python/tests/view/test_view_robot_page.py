@@ -156,12 +156,12 @@ def test_words_are_those_of_the_messages():
             hub.robot.take("behaviour", Behaviour(Header.at(0), "WHISK_IN", Time.of(20 * 10**9), "contact at <b>2</b>"))
             fault = ProcessHealth(Header.at(0), "bag", 99, "waiting", [KeyValue("bytes_written", "12")], "disk full")
             hub.robot.take("health/bag", fault)
-            expects = KeyValue("expects", "3.2 bits in 12.0 s: turn -120 degrees, drive 1.2 m")
+            expects = KeyValue("expects", "0.12 m2 of floor in 2.7 s")
             hub.robot.take("health/pilot", ProcessHealth(Header.at(0), "pilot", 98, "running", [expects]))
             await b.until(DRAWN)
             await b.until("$('processes').innerText.includes('bag')")
             doing = await b.text("#behaviour")
-            assert "Expects to learn" in doing and "3.2 bits in 12.0 s: turn -120 degrees, drive 1.2 m" in doing
+            assert "Expects" in doing and "0.12 m2 of floor in 2.7 s" in doing
             assert "whisk in" in doing and "contact at <b>2</b>" in doing and "5.4 s" in doing
             processes = await b.text("#processes")
             assert (

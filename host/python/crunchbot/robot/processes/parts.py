@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...planning.tiles import Tile
 from ...programs import program
 from ..policy import RANDOM
 from .children import Program
@@ -97,20 +96,6 @@ class Meeting(Places):
 
 
 @dataclass(frozen=True)
-class Choice:
-    """A name of policy.POLICIES, and the tile (column, row) that it looks at, where it looks at one."""
-
-    name: str = RANDOM
-    tile: Tile | None = None
-
-    @property
-    def options(self) -> list:
-        """Of the pilot."""
-        tile = [] if self.tile is None else ["--tile", "{},{}".format(*self.tile)]
-        return [] if self.name == RANDOM else ["--choose", self.name, *tile]
-
-
-@dataclass(frozen=True)
 class Body:
     """The robot: its scene folder, its models, and the base, Create 1 or 2, on a serial port."""
 
@@ -119,7 +104,7 @@ class Body:
     create: int | None  # None: wheels that obey at once, without a serial line
     port: Path
     seed: int  # of the random turns
-    choice: Choice = Choice()  # what takes their place
+    choose: str = RANDOM  # what takes their place, of `policy`
 
 
 def whisker(command: str) -> list[str]:
@@ -146,7 +131,7 @@ class Table:
     def pilot(self) -> list:
         body = self.body
         pilot = [*whisker("pilot"), body.scene, "--models", body.models, "--seed", body.seed, *self.places.reading]
-        return [*pilot, *body.choice.options]
+        return pilot if body.choose == RANDOM else [*pilot, "--choose", body.choose]
 
     def navigator(self) -> list:
         return [*whisker("navigator"), self.body.scene]

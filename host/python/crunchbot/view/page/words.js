@@ -46,7 +46,7 @@ function tellBehaviour(word) {
     ['State', doing ? words(doing.state.toLowerCase()) : 'not known: no word has come'],
     ['For', doing && word.now_s !== null ? duration(Math.max(0, word.now_s - doing.since_s)) : 'not known'],
     ['Because', doing ? doing.reason || 'no reason reported' : 'not known'],
-    ...(expects ? [['Expects to learn', expects]] : []),
+    ...(expects ? [['Expects', expects]] : []),
   ]);
 }
 

@@ -1,5 +1,5 @@
-"""Ways to new floor over maps as they grow, and what windows say of a tile. The search's arithmetic is
-host/nav/tests/test_coverage.c's; closed loops are lab/tests/scenes/test_closed_tasks.py's."""
+"""Ways to new floor over maps as they grow. The search's arithmetic is host/nav/tests/test_coverage.c's; closed loops are
+lab/tests/scenes/test_map_policy.py's."""
 
 import math
 from types import SimpleNamespace
@@ -9,22 +9,11 @@ import pytest
 
 from crunchbot.nav.mapper import FACE
 from crunchbot.pilot.whereabouts import Whereabouts
-from crunchbot.planning.actions import REPEATED, Vehicle
-from crunchbot.planning.coverage import NOTHING_NEW, CoveragePlanner, Way, lanes, of_growing, of_known, sweep
-from crunchbot.planning.ground import ArenaMap, Ground
-from crunchbot.planning.tasks import (
-    DRIVE_M,
-    NO_WHISKERS,
-    NOT_REACHABLE,
-    NOTHING_SUSPECTED,
-    REST_TICKS,
-    Checking,
-    Mapping,
-)
-from crunchbot.planning.tiles import AS_MAPPED, WINDOWS_LEAST, WRONG, Tiles
-from crunchbot.scene import Arena, Robot, Whisker
+from crunchbot.planning.coverage import NOTHING_NEW, CoveragePlanner, Vehicle, Way, lanes, of_growing, sweep
+from crunchbot.planning.mapping import DRIVE_M, NO_WHISKERS, REST_TICKS, Mapping
+from crunchbot.scene import Robot, Whisker
 
-VEHICLE = Vehicle(0.15, 0.71, 0.5, 4.0, 0.25)
+VEHICLE = Vehicle(0.15, 0.71, 0.5, 0.25)
 ROBOT = Robot(
     0.165,
     0.03,
@@ -35,8 +24,6 @@ ROBOT = Robot(
         Whisker("feeler", "object", base_m=(0.1, 0.0), yaw_rad=0.0, length_m=0.11),
     ),
 )
-FLOOR = Arena((2.5, 2.5), 0.5, ("SMOOTH", "ROUGH", "VINYL"), ("SRVSR",) * 5, ((1.0, 1.0, 1.5, 1.5),))
-SURE = (np.diag([1e-4, 1e-4, 1e-4]), 1.0)
 NOWHERE, NEVER = np.zeros((0, 2)), np.zeros((0, 4))
 CELL = 0.025
 
@@ -128,14 +115,6 @@ def test_plans_do_not_depend_on_the_frame(axes):
     assert abs(turn) < 0.1 and drive > 0.1
 
 
-def test_a_known_ground_is_open_where_the_body_fits():
-    ground = Ground.of(ArenaMap(FLOOR), ROBOT)
-    field = of_known(ground, np.ones(ground.texture.shape, bool), NEVER, np.array([0.5, 0.5, 0.0]))
-    assert opened(field, 0.5, 0.5) == 1.0
-    assert opened(field, 0.1, 0.5) == opened(field, 1.25, 1.25) == opened(field, 0.9, 1.25) == 0.0
-    assert field.fresh.all()
-
-
 def test_corners_so_near_are_passed():
     way = Way(np.array([[0.02, 0.0], [0.02, 1.0]]))
     turn, drive = way.first(np.zeros(3))
@@ -211,83 +190,3 @@ def test_another_frame_is_another_map():
     frame = 1
     task.turn(body, 2200, 25.0, 90.0)
     assert sum(map(len, task._been)) <= 2
-
-
-NATS = math.log(8.5 / 0.75)  # of a window that is right in 85 %
-
-
-def windows(left, right):
-    """Log-likelihoods of one window that says these textures."""
-    out = np.zeros((2, 3))
-    out[0, left] = out[1, right] = NATS
-    return out
-
-
-def test_a_tile_is_known_after_windows_enough():
-    tiles = Tiles(FLOOR, ROBOT)
-    pose = np.array([0.25, 0.55, 0.0])  # the left tip at (0.25, 0.75), the right one at (0.25, 0.35)
-    for n in range(WINDOWS_LEAST):
-        assert tiles.known((0, 1)) is None, n
-        tiles.take(pose, *SURE, windows(1, 0))
-    assert tiles.known((0, 1)) == 1 and tiles.known((0, 0)) == 0
-    assert tiles.suspected() == (0, 1)
-    assert tiles.known((2, 2)) is None and tiles.posterior((2, 2))[tiles.mapped[2, 2]] == AS_MAPPED
-
-
-def test_a_window_that_repeats_counts_less():
-    tiles, pose = Tiles(FLOOR, ROBOT), np.array([0.25, 0.55, 0.0])
-    said = []
-    for _ in range(3):
-        before = tiles._log[1, 0].copy()
-        tiles.take(pose, *SURE, windows(1, 0))
-        said.append(np.ptp(tiles._log[1, 0] - before))
-    assert said[1] == pytest.approx(REPEATED * said[0]) and said[2] == pytest.approx(said[1])
-    assert said[0] < math.log((1.0 - WRONG + WRONG / 3) / (WRONG / 3)) + 1e-9
-
-
-@pytest.mark.parametrize(
-    ("pose", "covariance", "confidence"),
-    [
-        ((0.25, 0.32, 0.0), np.diag([1e-4, 1e-4, 1e-4]), 1.0),  # 2 cm from the tile's edge
-        ((0.25, 0.55, 0.0), np.diag([0.1, 0.1, 0.0]), 1.0),
-        ((0.25, 0.55, 0.0), np.diag([1e-4, 1e-4, 1e-4]), 0.5),
-        ((0.25, 0.55, 0.0), np.diag([1e-4, 1e-4, 1.0]), 1.0),
-    ],
-)
-def test_a_window_whose_tile_is_not_sure_does_not_count(pose, covariance, confidence):
-    tiles = Tiles(FLOOR, ROBOT)
-    for _ in range(40):
-        tiles.take(np.array(pose), covariance, confidence, windows(1, 1))
-    assert tiles.known((0, 1)) is None
-
-
-def checker(tile, estimate, arena=FLOOR):
-    ground = Ground.of(ArenaMap(arena), ROBOT)
-    return Checking(ground, VEHICLE, Tiles(arena, ROBOT), estimate, Otherwise(), tile)
-
-
-def test_checking_goes_to_its_tile_and_says_what_it_is():
-    pose = np.array([0.3, 2.2, 0.0])
-    task = checker((4, 4), lambda: (pose, *SURE))
-    turn = task.turn(Body(), 0, 25.0, 90.0)
-    assert abs(turn) < 0.2 and task.distance(Body(), 0) > 0.3
-    there = np.array([2.25, 2.1, 0.0])
-    for n in range(2 * WINDOWS_LEAST):
-        task._tiles.take(there, *SURE, windows(1 if n else 0, 0))
-    assert task.look() == "as mapped" and task.turn(Body(), 2000, 25.0, 90.0) == 0.0
-
-
-def test_checking_refuses_what_no_way_leads_to():
-    here = np.array([0.3, 2.2, 0.0])
-    task = checker((2, 2), lambda: (here, *SURE))
-    assert task.turn(Body(), 0, 25.0, 90.0) == 0.0 and task.result == NOT_REACHABLE
-    with pytest.raises(ValueError, match=r"^tile 5,0: outside the floor's 5 x 5; give one inside$"):
-        checker((5, 0), lambda: None)
-
-
-def test_checking_without_a_pose_or_a_suspicion():
-    lost = checker((4, 4), lambda: None)
-    assert lost.turn(Body(), 0, 25.0, 90.0) == 0.7 and lost.whisk(Body(), 0)
-    calm = checker(None, lambda: (np.array([0.3, 2.2, 0.0]), *SURE))
-    assert calm.turn(Body(), 0, 25.0, 90.0) == 0.0 and calm.way.refused == NOTHING_SUSPECTED
-    assert not calm.whisk(Body(), 0)
