@@ -2,15 +2,12 @@
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from chainrun import END_S, FAST_LINK, program, running, simulation, write_flat_scene
 
 from crunchbot.bridge.ring import Reader
-from crunchbot.scene import write
-from crunchbot_lab.simulation.scenes import make_scene
 from whisker_protocol import WIRE_VERSION
 
 RING = f"whisker-bad-{os.getpid()}"  # no other test's, which may run beside this one
@@ -74,12 +71,6 @@ def test_truncated_stream(tmp_path):
     assert len(lines) == 1 and "after frame" in lines[0] and "check the USB cable" in lines[0], done.stderr
 
 
-def test_missing_device():
-    done = subprocess.run([program("whiskerd"), "--ring", RING], capture_output=True, text=True, timeout=END_S)
-    assert done.returncode == 1
-    assert "no bridge is connected; plug it in" in only_line(done.stderr, "whiskerd")
-
-
 def test_second_daemon(tmp_path):
     scene, _ = write_flat_scene(tmp_path, 1)
     second = tmp_path / "second.txt"
@@ -97,18 +88,6 @@ def test_second_daemon(tmp_path):
     *lines, code = second.read_text().splitlines()
     assert code == "1"
     assert "another" in only_line("\n".join(lines), "whiskerd")
-
-
-def test_scene_with_an_unknown_key(tmp_path):
-    scene, _ = make_scene(1)
-    write(tmp_path, scene)
-    arena = tmp_path / "arena.toml"
-    arena.write_text("colour = 'red'\n" + arena.read_text())
-    command = [sys.executable, "-m", "crunchbot.cli", "localise", tmp_path, "--filter", "grid"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=END_S)
-    assert done.returncode == 2
-    line = only_line(done.stderr, "whisker")
-    assert "arena.toml" in line and "colour" in line
 
 
 def test_flat_scene_with_an_unknown_item(tmp_path):

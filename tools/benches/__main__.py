@@ -2,7 +2,7 @@
 
     make bench                                        all topics: bench/results/*.json, docs/charts/*.svg
     .venv/bin/python tools/benches --only ring nav    some topics, one after the other
-    .venv/bin/python tools/benches nav --quick        one topic, with options of its own; `nav --help` lists them
+    .venv/bin/python tools/benches nav --seeds 5      one topic, with options of its own; `nav --help` lists them
 
 A topic's measurements are kept in build/bench for the state of the tree that they are of: an interrupted run goes on
 where it stopped, and in another state all is measured anew; `--fresh` begins again. All topics together take the sizes

@@ -1,12 +1,6 @@
-"""Two bridges tick as one: how far apart their SYNC pulses are, whatever the cable and however far their clocks run apart.
+"""Two bridges tick as one: how far apart their SYNC pulses are, whatever the cable and however far their clocks run apart."""
 
-WHISKER_PAIR_OUT names a file for the figures (tools/benches makes a result of them).
-"""
-
-import json
-import os
 import random
-from pathlib import Path
 from types import SimpleNamespace
 
 import cocotb
@@ -62,7 +56,6 @@ async def rises(signal, times: list[int]):
 
 @cocotb.test(timeout_time=200, timeout_unit="ms")
 async def sync_pulses_of_two_bridges_come_together(dut):
-    found = []
     dut.a_rst.value = dut.b_rst.value = 1
     Clock(dut.a_clk, CLOCK_PS, unit="ps").start()
     await Timer(random.randrange(CLOCK_PS), unit="ps")
@@ -94,9 +87,6 @@ async def sync_pulses_of_two_bridges_come_together(dut):
             assert timing["tick"] == (await first.read("timing"))["tick"] == TICKS
             skews = [(b - a) / 1000 for a, b in zip(*syncs, strict=True)]
             assert max(map(abs, skews)) <= SKEW_NS, (metres, beside)
-            found.append({"cable_m": metres, "beside_ns": beside, "least_ns": min(skews), "most_ns": max(skews)})
-    if out := os.environ.get("WHISKER_PAIR_OUT"):
-        Path(out).write_text(json.dumps(found))
 
 
 def test_pair():

@@ -1,24 +1,13 @@
-"""Clients of whisker-base that mean no good, and how long honest ones wait beside them.
+"""Clients of whisker-base that mean no good, in a process of their own; and how long honest ones wait beside them."""
 
-    python host/python/tests/pilot/hostile_clients.py --count 200 --seconds 60 --seed 1
-
-Starts emulator and driver, COUNT hostile clients in a process of their own, and for SECONDS two honest clients: one that
-drives all the time, and one that connects anew each time. Prints their waits; exit code 1: one of them was longer than
-1 s, or was turned away.
-"""
-
-import argparse
 import contextlib
 import random
 import socket
 import subprocess
 import sys
-import tempfile
 import time
-from pathlib import Path
 
-from crunchbot.pilot.base import Base, BaseError
-from crunchbot.programs import program
+from crunchbot.pilot.base import Base
 
 WAIT_MOST_S = 1.0
 WORDS = (
@@ -107,7 +96,7 @@ def attack(path: str, count: int, seed: int) -> None:
 @contextlib.contextmanager
 def attacked(path: str, count: int, seed: int):
     """While `count` hostile clients, in a process of their own, do what they can."""
-    words = [sys.executable, __file__, "--attack", path, "--count", str(count), "--seed", str(seed)]
+    words = [sys.executable, __file__, path, str(count), str(seed)]
     with subprocess.Popen(words) as process:
         try:
             yield
@@ -137,51 +126,5 @@ def serve_honest(path: str, go_on) -> tuple[list[float], list[float]]:
     return orders, visits
 
 
-def describe(name: str, waits: list[float]) -> str:
-    waits = sorted(waits)
-    middle, late = waits[len(waits) // 2], waits[len(waits) * 99 // 100]
-    return f"{name}: {len(waits)}, median {middle * 1e3:.2f} ms, 99 % {late * 1e3:.1f} ms, longest {waits[-1] * 1e3:.0f} ms"
-
-
-def measure(count: int, seconds: float, seed: int) -> int:
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        link, path, log = folder / "port", folder / "sock", folder / "log"
-        with contextlib.ExitStack() as stack:
-            emulator = stack.enter_context(subprocess.Popen([program("whisker-create-sim"), "--link", link], stdout=-1))
-            stack.callback(emulator.terminate)
-            emulator.stdout.readline()
-            driver = stack.enter_context(
-                subprocess.Popen(
-                    [program("whisker-base"), "--port", link, "--socket", path],
-                    stderr=stack.enter_context(log.open("w")),
-                )
-            )
-            stack.callback(driver.terminate)
-            while not path.exists():
-                time.sleep(0.01)
-            end = time.monotonic() + seconds
-            try:
-                with attacked(str(path), count, seed):
-                    orders, visits = serve_honest(str(path), lambda: time.monotonic() < end)
-            except BaseError as error:
-                print(f"turned away: {error}")
-                return 1
-        print(describe("orders", orders), describe("visits", visits), f"log: {log.stat().st_size} bytes", sep="\n")
-        return int(max(orders + visits) > WAIT_MOST_S)
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--seconds", type=float, default=60)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--attack", metavar="SOCKET", help="be the hostile clients of a whisker-base that runs")
-    words = parser.parse_args()
-    if words.attack:
-        attack(words.attack, words.count, words.seed)
-    return measure(words.count, words.seconds, words.seed)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    attack(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
