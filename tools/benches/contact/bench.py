@@ -10,7 +10,7 @@ import numpy as np
 from tqdm import tqdm
 
 from .. import store
-from .measure import CASES, FIRST_S, WHISKED, contacts, decided, follow, true_motion
+from .measure import CASES, FIRST_S, contacts, follow, true_motion
 from .scenes import TICK_S
 
 CONTACTS = 20
@@ -64,19 +64,6 @@ def summary(kind: str, found: list[dict]) -> dict:
     return reported
 
 
-def verdicts(kind: str, found: list[dict]) -> dict[str, float]:
-    """Corner or face: shares that are right and wrong with 90 %, and of these the errors of place and of a face's
-    normal."""
-    tip, other = (np.array([one[name] for one in found]) for name in ("tip", "other"))
-    shaft = 1.0 - tip - other
-    right, wrong = (shaft, tip) if kind == "corner" else (tip, shaft)
-    made = {"contacts": len(found), "right": float((right >= 0.9).mean()), "wrong": float((wrong >= 0.9).mean())}
-    off, turn = (
-        np.array([one[name] for one in found])[np.maximum(right, wrong) >= 0.9] for name in ("off_mm", "turn_deg")
-    )
-    return made | {"point_rms_mm": rms(off), "normal_rms_deg": rms(turn)}
-
-
 def slip_figures(slip: np.ndarray, slides: np.ndarray) -> dict[str, float]:
     """Stick or slip: share that sticks, share that is right, expected calibration error over five bins."""
     bins = np.minimum((5 * slip).astype(int), 4)
@@ -87,14 +74,12 @@ def slip_figures(slip: np.ndarray, slides: np.ndarray) -> dict[str, float]:
 
 def run(build: Path, each: int = CONTACTS) -> None:
     """Measure all kinds with the friction known and not, and against a chain of links in MuJoCo."""
-    results: dict = {"tick_s": TICK_S, "first_s": FIRST_S, "kinds": {}, "whisked": {}}
+    results: dict = {"tick_s": TICK_S, "first_s": FIRST_S, "kinds": {}}
     for name, case in CASES.items():
         for kind in case.kinds:
             made = tqdm(contacts(case, kind, each), desc=f"{name}: {kind}", total=each)
             found = [follow(case, kind, scene, least) for scene, least in made]
             results["kinds"].setdefault(name, {})[kind] = summary(kind, found)
-    for kind in WHISKED:
-        results["whisked"][kind] = verdicts(kind, list(tqdm(decided(kind, each), desc=f"whisked: {kind}", total=each)))
     store.write_result("contact", rounded(results))
 
 

@@ -74,26 +74,6 @@ def moving(rng, still: bool = False) -> Plan:
     return Plan(bases, velocity, rng.uniform(0.07, 0.12))
 
 
-def body_whisk(rng, place: Callable) -> Plan:
-    """What the pilot does: drives into an object, backs off until it is free, and turns against it. A turn about the
-    robot's centre draws the whisker's exit along the shaft as well."""
-    yaw, deep = rng.uniform(0.3, 0.6), int(rng.integers(60, 120))
-    ahead = np.array([np.cos(yaw), -np.sin(yaw), 0.0])
-    moves = ((0.15 * ahead, deep), (-0.03 * ahead, round(5.75 * deep)), ((-0.16 * WHISK, 0.0, -WHISK), 1600))
-    bases = np.concatenate([np.tile(base, (ticks, 1)) for base, ticks in moves])
-    return place(Plan(bases, standing(len(bases)), TIP, lies=True))
-
-
-def whisked_corner(rng) -> Plan:
-    return body_whisk(rng, lambda plan: plan._replace(touched_m=rng.uniform(0.07, 0.12)))
-
-
-def whisked_face(rng) -> Plan:
-    angle = rng.uniform(np.radians(100), np.radians(140))
-    return body_whisk(rng, lambda plan: plan._replace(round_m=FLAT_M, normal=angle))
-
-
-WHISKED = {"corner": whisked_corner, "face": whisked_face}
 KINDS = {
     "corner, drive": corner_drive,
     "corner, body whisk": corner_whisk,
@@ -106,7 +86,6 @@ KINDS = {
     "face, head-on": head_on,
 }
 CHAINED = [kind for kind in KINDS if not kind.startswith("moving")]
-WHISKED_FIRST = 200_000  # seed
 
 
 class Case(NamedTuple):
@@ -211,20 +190,3 @@ def slides(scene: Scene, at: np.ndarray) -> np.ndarray:
 
 def first_touch(scene: Scene) -> int:
     return int(np.argmax(scene.point[:, 1] > 0))
-
-
-def decided(kind: str, count: int) -> Iterator[dict[str, float]]:
-    """What the filter says at the end of a chain's body whisk, over the gap between both pushes."""
-    for seed in range(count):
-        draw = Draw.of(WHISKED_FIRST + 1000 * list(WHISKED).index(kind) + seed)
-        scene = chained(WHISKED[kind](draw.rng), draw)
-        if scene is None or not np.any(scene.bases[-1][2]):
-            continue  # the turn did not meet it
-        found = ContactFilter(creep=0.0).run(scene.bases, scene.tilt)
-        at = found.sample[-1]
-        yield {
-            "tip": found.tip[-1],
-            "other": found.other[-1],
-            "off_mm": 1e3 * float(np.hypot(*(found.point[-1] - scene.point[at]))),
-            "turn_deg": float(np.degrees(found.normal_rad[-1] - scene.normal[at])),
-        }

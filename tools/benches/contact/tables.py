@@ -64,17 +64,3 @@ def slips(case: str) -> str:
             "expected calibration error": "{slip_ece:.3f}",
         },
     )
-
-
-def whisked() -> str:
-    return lined(
-        named(read_result("contact")["whisked"], "object"),
-        {
-            "object": "{object}",
-            "n": "{contacts}",
-            "right": "{right:100*.0f} %",
-            "wrong": "{wrong:100*.0f} %",
-            "place RMS mm": "{point_rms_mm:.2f}",
-            "normal RMS degrees": "{normal_rms_deg:.2f}",
-        },
-    )

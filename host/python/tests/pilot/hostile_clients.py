@@ -9,7 +9,6 @@ import time
 
 from crunchbot.pilot.base import Base
 
-WAIT_MOST_S = 1.0
 WORDS = (
     b"drive 1",
     b"dri",
