@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <exception>
 
-#include "free_bridge.h"
+#include "ticking_bridge.h"
 
 using namespace bridge_sim;
 
@@ -25,9 +25,9 @@ void print_times(const char *name, std::vector<uint64_t> cycles)
 }
 
 // Of whole transfers: the run's last one may have been cut short.
-void print_run(const FreeSettings &settings, uint64_t ticks)
+void print_run(const RunSettings &settings, uint64_t ticks)
 {
-    const FreeRun run = run_free(settings, ticks);
+    const BridgeRun run = run_bridge(settings, ticks);
     uint64_t shortest = UINT64_MAX, longest = 0;
     for (size_t i = 1; i < run.syncs.size(); i++) {
         shortest = std::min(shortest, run.syncs[i] - run.syncs[i - 1]);
@@ -51,12 +51,8 @@ void print_all(uint64_t ticks)
     const char *before = "[";
     for (const bool every : {false, true}) {
         for (const bool fast : {false, true}) {
-            FreeSettings settings;
+            RunSettings settings = fast ? RunSettings::fastest() : RunSettings();
             settings.options = every ? WHISKER_CONTROL_OPTION_EVERY_FRAME : 0;
-            if (fast) {
-                settings.sck_divider = WHISKER_LIMIT_SCK_DIVIDER_MIN;
-                settings.word_gap = WHISKER_LIMIT_WORD_GAP_MIN;
-            }
             std::printf("%s", before);
             print_run(settings, ticks);
             before = ", ";

@@ -25,6 +25,7 @@ class FreeRig : public RtlRig
     FreeRig() : RtlRig(LANES, SEED, {})
     {
         bridge_.tick_by_itself();
+        bridge_.run_nodes_by_itself();
     }
 
     Outcome in(uint8_t endpoint, size_t limit, Bytes &data) override

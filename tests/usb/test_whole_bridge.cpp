@@ -5,8 +5,7 @@
 #include <algorithm>
 
 #include "bridge_model.h"
-#include "free_bridge.h"
-#include "paced_bridge.h"
+#include "ticking_bridge.h"
 #include "usb_control.h"
 #include "whisker_protocol.h"
 
@@ -204,8 +203,11 @@ void update_orders_to_running_nodes_do_nothing(void **)
 void the_link_bounds_the_pace(void **)
 {
     constexpr uint64_t TICKS = 100;
-    assert_true(run_paced(LINK_CYCLES, TICKS, 0).sustained());
-    assert_false(run_paced(LINK_CYCLES - 1, TICKS, 0).sustained());
+    RunSettings settings = RunSettings::fastest();
+    settings.asked_every = LINK_CYCLES;
+    assert_true(run_bridge(settings, TICKS).sustained(TICKS));
+    settings.asked_every--;
+    assert_false(run_bridge(settings, TICKS).sustained(TICKS));
 }
 
 // As on a board: no tick comes from outside, and the host asks without a pause.
@@ -214,9 +216,9 @@ void its_own_ticks_are_even_and_dated_by_the_host(void **)
     constexpr uint64_t TICKS = 12;
     constexpr double LIMIT_US = 600;
     for (const bool every : {false, true}) {
-        FreeSettings settings;
+        RunSettings settings;
         settings.options = every ? WHISKER_CONTROL_OPTION_EVERY_FRAME : 0;
-        const FreeRun run = run_free(settings, TICKS);
+        const BridgeRun run = run_bridge(settings, TICKS);
         assert_int_equal(run.bad, 0);
         for (size_t i = 1; i < run.syncs.size(); i++) {
             assert_int_equal(run.syncs[i] - run.syncs[i - 1], WHISKER_LIMIT_TICK_PERIOD);
@@ -236,10 +238,10 @@ void its_own_ticks_are_even_and_dated_by_the_host(void **)
 // What control_registers takes as the shortest period, with every record good and no frame lost.
 void the_shortest_period_is_kept(void **)
 {
-    FreeSettings settings;
+    RunSettings settings;
     settings.options = WHISKER_CONTROL_OPTION_EVERY_FRAME;
     settings.tick_period = WHISKER_LIMIT_TICK_PERIOD_MIN;
-    const FreeRun run = run_free(settings, 40);
+    const BridgeRun run = run_bridge(settings, 40);
     assert_int_equal(run.bad, 0);
     assert_int_equal(run.syncs[39] - run.syncs[0], 39 * WHISKER_LIMIT_TICK_PERIOD_MIN);
 }

@@ -58,7 +58,11 @@ void BridgeModel::start_tick()
 void BridgeModel::tick_by_itself()
 {
     top_->tick_external = 0;
-    free_ = true;
+}
+
+void BridgeModel::run_nodes_by_itself()
+{
+    runs_nodes_ = true;
 }
 
 // A cycle after the transfer: the nodes see select rise first.
@@ -176,7 +180,7 @@ void BridgeModel::cycle()
     top.miso = bus_.pins(top.sync, top.select_n, top.sck, top.mosi) & (UINT32_MAX >> (32 - LANES));
     top.flash_miso = flash_.step(top.flash_cs_n, top.flash_sck, top.flash_mosi);
     cycles++;
-    if (free_) {
+    if (runs_nodes_) {
         run_nodes();
     }
 }

@@ -22,9 +22,11 @@ class BridgeModel : public UtmiDevice
 
     void cycle() override;
 
-    // From now on ticks are the bridge's own, every tick_period, as on a board, and the nodes read their sensors after
-    // each; else ticks are start_tick()'s, and the caller runs the nodes.
+    // From now on ticks are the bridge's own, every tick_period, as on a board; else they are start_tick()'s.
     void tick_by_itself();
+
+    // From now on the nodes read their sensors after each tick; else the caller runs them.
+    void run_nodes_by_itself();
 
     // As after power came: registers, FIFO and USB device begin anew.
     void reset();
@@ -53,7 +55,7 @@ class BridgeModel : public UtmiDevice
     NodeBus &bus_;
     FlashPins flash_;
     std::unique_ptr<Vclocked_bridge> top_;
-    bool free_ = false;  // ticks by itself
+    bool runs_nodes_ = false;
     bool busy_ = false;  // the link was, a cycle ago
     bool ended_ = false; // its transfer has
 };

@@ -1,4 +1,4 @@
-#include "free_bridge.h"
+#include "ticking_bridge.h"
 
 #include <algorithm>
 #include <stdexcept>
@@ -16,19 +16,48 @@ constexpr uint64_t MICROFRAME = WHISKER_LIMIT_CLOCK_HZ / 8000;
 constexpr uint32_t SETTLED = 20; // ticks after which the nodes have readings
 constexpr uint64_t SEED = 1;
 
-class FreeBridge : public UtmiDevice
+class TickingBridge : public UtmiDevice
 {
   public:
-    explicit FreeBridge(std::vector<uint64_t> &syncs) : nodes_(LANES, SEED), bridge_(nodes_, flash_), syncs_(syncs)
+    TickingBridge(bool own_ticks, std::vector<uint64_t> &syncs)
+        : nodes_(LANES, SEED), bridge_(nodes_, flash_), syncs_(syncs)
     {
         nodes_.power_on();
-        bridge_.tick_by_itself();
+        bridge_.run_nodes_by_itself();
+        if (own_ticks) {
+            bridge_.tick_by_itself();
+        }
+    }
+
+    // From the next cycle on a tick every `period` cycles (at least 1), until so many were asked for.
+    void ask(uint64_t period, uint64_t ticks)
+    {
+        period_ = period;
+        left_ = ticks;
+        wait_ = 0;
+    }
+
+    bool all_asked() const
+    {
+        return left_ == 0;
+    }
+
+    bool running() const
+    {
+        return bridge_.running();
     }
 
     void cycle() override
     {
         bridge_.in = in;
-        bridge_.cycle();
+        if (left_ > 0 && wait_ == 0) {
+            bridge_.start_tick();
+            left_--;
+            wait_ = period_;
+        } else {
+            bridge_.cycle();
+        }
+        wait_ -= wait_ > 0 ? 1 : 0;
         out = bridge_.out;
         cycles++;
         if (bridge_.sync() && !sync_) {
@@ -43,12 +72,15 @@ class FreeBridge : public UtmiDevice
     BridgeModel bridge_;
     std::vector<uint64_t> &syncs_;
     bool sync_ = false;
+    uint64_t period_ = 1;
+    uint64_t left_ = 0; // ticks to ask for
+    uint64_t wait_ = 0; // cycles until the next
 };
 
 class Session
 {
   public:
-    explicit Session(const FreeSettings &settings) : settings_(settings)
+    explicit Session(const RunSettings &settings) : settings_(settings)
     {
         Descriptors descriptors;
         const char *error = nullptr;
@@ -59,14 +91,19 @@ class Session
         next_microframe_ = bridge_.cycles;
     }
 
-    FreeRun run(uint64_t ticks)
+    BridgeRun run(uint64_t ticks)
     {
         control(1);
-        while (run_.packets.size() < ticks) {
+        const uint64_t period = settings_.asked_every;
+        bridge_.ask(period, period ? ticks : 0);
+        while (period ? !bridge_.all_asked() : run_.packets.size() < ticks) {
             poll();
         }
         control(0);
         while (!check_.ended()) {
+            if (period && bridge_.running() && bridge_.all_asked()) { // a tick that a busy link ignored is asked again
+                bridge_.ask(std::max(period, MICROFRAME), 1);
+            }
             poll();
         }
         return std::move(run_);
@@ -103,7 +140,6 @@ class Session
         if (host_.in(WHISKER_LIMIT_USB_BULK_IN & 0xF, WHISKER_LIMIT_BULK_PACKET, packet) == Outcome::OK) {
             note(packet);
         }
-        host_.idle(settings_.rest);
     }
 
     void note(const Bytes &packet)
@@ -132,9 +168,9 @@ class Session
         }
     }
 
-    FreeSettings settings_;
-    FreeRun run_;
-    FreeBridge bridge_{run_.syncs};
+    RunSettings settings_;
+    BridgeRun run_;
+    TickingBridge bridge_{settings_.asked_every == 0, run_.syncs};
     UsbHost host_{bridge_};
     FrameCheck check_{[this](const CheckedFrame &frame) { count(frame); }, settings_.tick_period};
     Bytes stream_;
@@ -144,7 +180,7 @@ class Session
 
 } // namespace
 
-std::vector<uint64_t> FreeRun::transfers(size_t batch) const
+std::vector<uint64_t> BridgeRun::transfers(size_t batch) const
 {
     std::vector<size_t> ends(sizes.size()); // by packet: the one that ends its transfer
     size_t first = 0, bytes = 0;
@@ -169,7 +205,20 @@ std::vector<uint64_t> FreeRun::transfers(size_t batch) const
     return taken;
 }
 
-FreeRun run_free(const FreeSettings &settings, uint64_t ticks)
+bool BridgeRun::sustained(uint64_t ticks) const
+{
+    return packets.size() == ticks && bad == 0;
+}
+
+RunSettings RunSettings::fastest()
+{
+    RunSettings settings;
+    settings.sck_divider = WHISKER_LIMIT_SCK_DIVIDER_MIN;
+    settings.word_gap = WHISKER_LIMIT_WORD_GAP_MIN;
+    return settings;
+}
+
+BridgeRun run_bridge(const RunSettings &settings, uint64_t ticks)
 {
     return Session(settings).run(ticks);
 }
