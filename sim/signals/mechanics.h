@@ -1,5 +1,5 @@
 /* Whiskers one by one at level 1, with the mechanics of sim/mechanics: contacts and sweeps that a study prescribes tick
- * by tick, tilt of the plug and counts out; and a scene of 28 to measure speed with.
+ * by tick, tilt of the plug and counts out.
  */
 #ifndef SIM_SIGNALS_MECHANICS_H
 #define SIM_SIGNALS_MECHANICS_H
@@ -11,15 +11,6 @@
 
 /* cffi: begin */
 typedef struct sim_drag sim_drag;
-typedef struct sim_mechanics_scene sim_mechanics_scene;
-
-/* What a scene of 28 whiskers does: 4 against objects all the time, 8 dragged over floors, 16 touching nothing. */
-struct sim_mechanics_setting {
-    int level;    /* of mech_whisker.h */
-    bool sliding; /* the contacts also slide along the shaft, at 10 mm/s */
-    bool counts;  /* sensor noise and counts too */
-    double tick_s;
-};
 
 /* Lets ticks pass for a whisker against objects. radius[i] 0: no touch; else as struct mech_touch. Writes the tilt in
  * the plane of bending (rad) and whether the contact holds. */
@@ -45,13 +36,6 @@ void sim_mechanics_counts(const struct mech_whisker *whisker, size_t ticks, doub
 
 /* A floor of mech_floor.h, or NULL beyond the last. */
 const struct sim_floor_texture *sim_mechanics_floor(size_t floor);
-
-/* A scene, or NULL if memory is short; whiskers differ by the seed. */
-sim_mechanics_scene *sim_mechanics_scene_new(const struct sim_mechanics_setting *setting, uint64_t seed);
-void sim_mechanics_scene_free(sim_mechanics_scene *scene);
-
-/* Lets ticks pass. Returns a sum over all that came out, so that nothing is left out as unused. */
-double sim_mechanics_scene_run(sim_mechanics_scene *scene, size_t ticks);
 /* cffi: end */
 
 #endif

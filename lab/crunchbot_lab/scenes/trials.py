@@ -7,7 +7,7 @@ import numpy as np
 
 from crunchbot.nav import localise
 from crunchbot.nav.observations import Observations
-from crunchbot.nav.scoring import LOCK_M, LOCK_ROWS, heading_errors, lock_row, position_errors
+from crunchbot.nav.scoring import LOCK_M, LOCK_ROWS, lock_row, position_errors
 
 from .making import Made, make
 
@@ -35,17 +35,11 @@ def trial(family: str, seed: int, filter: str, settings: dict, rows: int | None,
         "rows": len(run.table),
         "error_median_m": float(np.median(distance[counted])),
         "error_rms_m": float(np.sqrt(np.mean(distance[counted] ** 2))),
-        "error_p90_m": float(np.quantile(distance[counted], 0.9)),
-        "heading_median_rad": float(np.median(heading_errors(run.poses, made.observations.truth)[counted])),
         "near_at_end": bool((distance[-LOCK_ROWS:] <= LOCK_M).all()),
-        "error_end_m": float(np.median(distance[-LOCK_ROWS:])),
         "lock_rows": lock,
         "faulty": _faulty(run),
-        "bad_cells": run.bad_cells,
-        "bad_rows": run.bad_rows,
         "judged": _judged(run, made.observations, distance, regions, begun if lock is None else begun + lock),
-        "work": _work(run),
-        "timing": _timing(run, begun, lock),
+        "timing": _timing(run),
     }
 
 
@@ -80,21 +74,6 @@ def _judged(run: localise.Run, rows: Observations, distance: np.ndarray, regions
     }
 
 
-def _work(run: localise.Run) -> dict:
-    table = run.table
-    out = {f"{name}_mean": float(table[name].mean()) for name in ("evaluations", "distinct", "touched")}
-    return out | {f"{name}_max": int(table[name].max()) for name in ("evaluations", "touched", "states", "bytes")}
-
-
-def _timing(run: localise.Run, begun: int, lock: int | None) -> dict:
+def _timing(run: localise.Run) -> dict:
     us = run.step_us
-    until = us[begun : begun + lock] if lock else us[:0]
-    return {
-        "setup_s": run.setup_s,
-        "step_us_mean": float(us.mean()),
-        "step_us_median": float(np.median(us)),
-        "step_us_p99": float(np.quantile(us, 0.99)),
-        "step_us_p999": float(np.quantile(us, 0.999)),
-        "step_us_max": float(us.max()),
-        "until_lock_us_mean": float(until.mean()) if len(until) else None,
-    }
+    return {"step_us_median": float(np.median(us)), "step_us_p99": float(np.quantile(us, 0.99))}

@@ -1,11 +1,11 @@
-"""The same bytes from any number of workers and from any backend; what is done is not done again."""
+"""The same bytes from any number of workers; what is done is not done again."""
 
 import json
 
 import pytest
 
 from crunchbot_lab.scenes import trials
-from crunchbot_lab.scenes.sweep import SweepError, sweep
+from crunchbot_lab.scenes.sweep import sweep
 
 JOBS = {
     f"{name}-{seed}": {"family": "anchor+global", "seeds": [seed], "filter": name, "settings": {}, "rows": 120}
@@ -23,17 +23,12 @@ def untimed(results):
 
 @pytest.fixture(scope="module")
 def in_turn(tmp_path_factory):
-    return untimed(sweep(trials.trials, JOBS, tmp_path_factory.mktemp("serial"), backend="serial"))
+    return untimed(sweep(trials.trials, JOBS, tmp_path_factory.mktemp("serial"), 1))
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_processes_give_what_one_process_gives(workers, tmp_path, in_turn):
     assert untimed(sweep(trials.trials, JOBS, tmp_path, workers)) == in_turn
-
-
-def test_dask_gives_what_one_process_gives(tmp_path, in_turn):
-    pytest.importorskip("dask.distributed")
-    assert untimed(sweep(trials.trials, JOBS, tmp_path, 2, "dask")) == in_turn
 
 
 def count(mark):
@@ -49,8 +44,8 @@ def fail(text):
 
 def test_what_is_done_is_not_done_again(tmp_path):
     jobs = {name: {"mark": str(tmp_path / name)} for name in ("a", "b")}
-    sweep(count, {"a": jobs["a"]}, tmp_path / "out", backend="serial")
-    results = sweep(count, jobs, tmp_path / "out", backend="serial")
+    sweep(count, {"a": jobs["a"]}, tmp_path / "out", 1)
+    results = sweep(count, jobs, tmp_path / "out", 1)
     assert list(results) == ["a", "b"]
     assert [(tmp_path / name).read_text() for name in jobs] == ["x", "x"]
 
@@ -59,8 +54,3 @@ def test_a_failed_job_stops_the_sweep_and_leaves_no_file(tmp_path):
     with pytest.raises(ValueError, match="broken"):
         sweep(fail, {"a": {"text": "broken"}}, tmp_path, 1)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_backend_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(SweepError, match="processes"):
-        sweep(count, {}, tmp_path, backend="cluster")
