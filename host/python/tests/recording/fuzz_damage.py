@@ -1,7 +1,9 @@
 """Recordings and bags that a card or a cable damaged: no more is lost than the chunks that were hit, and none of it unsaid.
 
 Of six inputs four have a bit flipped, one has a page of 4 KiB zeroed, one is cut: its end is missing, or a chunk, or any
-piece out of its middle. They are recordings of a ring and bags, finished ones and such that end within a chunk.
+piece out of its middle. They are recordings of a ring, bags, and files without chunks as other programs write them,
+finished ones and such that end within a chunk. In a file without chunks each message stands for a chunk. No checksum is
+its own, so one that was hit may be given changed, and that must be said.
 """
 
 import re
@@ -11,11 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import mcap.reader
+import mcap.writer
 import numpy as np
+from mcap.opcode import Opcode
 from rings import make_frames
 
 from crunchbot.recording import RecordingError, read
-from crunchbot.recording.mcapfile import McapFile
+from crunchbot.recording.mcapfile import MAGIC, McapFile
 from crunchbot.recording.messages import encode_block
 from crunchbot.recording.writing import RecordingWriter, TopicWriter
 from crunchbot.robot.network.messages import SCHEMAS, Header, Pose, PoseStamped, Time, encode
@@ -24,21 +28,29 @@ from crunchbot.robot.played import RECORD
 PAGE = 4096
 SECOND_NS = 10**9
 END_DAMAGED = ("at its end", "its closing record", "ends within", "does not end as")  # then nothing counts the losses
+CHANGED = ("the checksum of the whole is wrong", "bytes left out")
 LOST = re.compile(r"(\d+) of \d+ messages are lost$")
 
 
 @dataclass(frozen=True)
 class Original:
-    """A file as it was written: its bytes, the chunks' places, and each message with the chunk that it is in."""
+    """A file as it was written: its bytes, the chunks' places, and each message with the chunk that it is in.
+
+    described: where the descriptions of the channels stand that all messages need; empty where there are others.
+    """
 
     kind: str
     data: bytes
     chunks: list[tuple[int, int]]
     messages: dict[tuple, tuple[int, int]]  # (topic, time, bytes) -> (its number, its chunk)
     is_indexed: bool
+    has_chunks: bool = True
+    described: tuple[int, int] = (0, 0)
 
     def touched(self, first: int, last: int) -> set[int]:
         """Chunks that have any of the bytes from `first` up to `last`."""
+        if first < self.described[1] and self.described[0] < last:
+            return set(range(len(self.chunks)))
         return {n for n, (start, end) in enumerate(self.chunks) if start < last and first < end}
 
 
@@ -69,6 +81,21 @@ def bag(path: Path, seconds: int) -> None:
         writer.finish({"messages": str(30 * seconds)})
 
 
+def loose(path: Path, seconds: int) -> None:
+    rng = np.random.default_rng(2)
+    with path.open("wb") as file:
+        writer = mcap.writer.Writer(file, use_chunking=False, enable_data_crcs=True)
+        writer.start("ros2", "another program")
+        schema = writer.register_schema(SCHEMAS[PoseStamped], "ros2msg", b"")
+        channels = [writer.register_channel(f"/robot/pose/{name}", "cdr", schema) for name in ("grid", "particle")]
+        for k in range(10 * seconds):
+            for channel in channels:
+                at = SECOND_NS * k // 10
+                pose = PoseStamped(Header(Time(*divmod(at, SECOND_NS)), "map"), Pose.planar(*rng.random(3)))
+                writer.add_message(channel, at, encode(pose), at, k)
+        writer.finish()
+
+
 def contents(path: Path) -> list[tuple]:
     with McapFile(path) as file:
         return [(message.topic, message.log_time, bytes(message.data)) for message in file.messages()]
@@ -85,12 +112,27 @@ def original(kind: str, path: Path) -> Original:
     return Original(kind, path.read_bytes(), chunks, messages, True)
 
 
+def loose_original(path: Path) -> Original:
+    data, at, places, chunks = path.read_bytes(), len(MAGIC), {}, []
+    while (opcode := data[at]) != Opcode.DATA_END:
+        begin, at = at, at + 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+        places[opcode] = places.get(opcode, (begin, at))[0], at
+        if opcode == Opcode.MESSAGE:
+            chunks.append((begin, at))
+    messages = {message: (number, number) for number, message in enumerate(contents(path))}
+    assert len(messages) == len(chunks)
+    described = places[Opcode.CHANNEL]
+    return Original("loose", data, chunks, messages, True, False, described)
+
+
 def cut_off(whole: Original, share: float) -> Original:
     """The same, as a crash within a chunk leaves it."""
     chunk = int(share * len(whole.chunks))
     start, end = whole.chunks[chunk]
     messages = {message: place for message, place in whole.messages.items() if place[1] < chunk}
-    return Original(f"{whole.kind}, cut off", whole.data[: (start + end) // 2], whole.chunks[:chunk], messages, False)
+    data = whole.data[: (start + end) // 2]
+    kind = f"{whole.kind}, cut off"
+    return Original(kind, data, whole.chunks[:chunk], messages, False, whole.has_chunks, whole.described)
 
 
 def originals(folder: Path) -> list[Original]:
@@ -99,6 +141,8 @@ def originals(folder: Path) -> list[Original]:
         make(folder / f"{kind}.mcap", seconds)
         made.append(original(kind, folder / f"{kind}.mcap"))
         assert len(made[-1].chunks) >= seconds
+    loose(folder / "loose.mcap", 40)
+    made.append(loose_original(folder / "loose.mcap"))
     return [*made, *(cut_off(whole, 0.8) for whole in made)]
 
 
@@ -133,13 +177,16 @@ TURNS = ("flipped", "flipped", "zeroed", "flipped", "flipped", "cut")
 
 def outcome(of: Original, path: Path, touched: set[int]) -> str:
     """What became of a damaged file; AssertionError when too much is lost, or something is not said."""
-    numbers, damage, is_complete = [], [], False
+    numbers, changed, damage, is_complete = [], 0, [], False
     try:
         with McapFile(path) as file:
             for message in file.messages():
                 key = message.topic, message.log_time, bytes(message.data)
-                assert key in of.messages, f"a message that was not written: {key[:2]}"
-                numbers.append(of.messages[key][0])
+                if key in of.messages:
+                    numbers.append(of.messages[key][0])
+                else:
+                    changed += 1
+                    assert not of.has_chunks, f"a message that was not written: {key[:2]}"
             damage, is_complete = file.damage, file.complete
     except RecordingError as error:
         damage = [str(error)]
@@ -147,13 +194,15 @@ def outcome(of: Original, path: Path, touched: set[int]) -> str:
     read_on = set(numbers)
     lost = {key: place for key, place in of.messages.items() if place[0] not in read_on}
     assert {chunk for _, chunk in lost.values()} <= touched, f"lost more than the chunks {touched}: {damage}"
+    assert changed <= len(touched), f"{changed} changed messages of {len(touched)} that were hit: {damage}"
     assert all("\n" not in line for line in damage)
     if not lost:
         return "nothing lost, and said so" if damage else "nothing lost, nothing said"
     assert damage and not is_complete, "lost without a word"
     reported = sum(int(found[1]) for line in damage if (found := LOST.search(line)))
-    assert reported in (0, len(lost)), f"{len(lost)} lost, {reported} said to be: {damage}"
-    assert reported or not of.is_indexed or any(text in line for line in damage for text in END_DAMAGED), damage
+    assert not reported or len(lost) - changed <= reported <= len(lost), f"{len(lost)} lost, {reported} said: {damage}"
+    said = (*END_DAMAGED, *CHANGED) if changed else END_DAMAGED
+    assert reported or not of.is_indexed or any(text in line for line in damage for text in said), damage
     return "lost and counted" if reported else "lost and said"
 
 
