@@ -4,9 +4,6 @@ A value of n bytes begins at a multiple of n, counted from the end of the four-b
 as uint32, then its elements (DDS-XTypes 1.3, 7.4.1; DDSI-RTPS 2.5, 10.2).
 """
 
-import struct
-from functools import cache
-
 import numpy as np
 from numpy.typing import DTypeLike
 
@@ -16,11 +13,6 @@ LENGTH = np.dtype("<u4")
 
 class Malformed(ValueError):
     """Bytes that are no such message; says what is wrong with them."""
-
-
-@cache
-def _number(code: str) -> struct.Struct:
-    return struct.Struct(f"<{code}")
 
 
 class Layout:
@@ -68,45 +60,3 @@ def _alignment(kind: np.dtype) -> int:
     while kind.names:
         kind = kind.fields[kind.names[0]][0]
     return kind.base.itemsize
-
-
-class Decoder:
-    """Reads a message's values off its bytes and believes no length: Malformed when there are too few bytes for it."""
-
-    def __init__(self, data: bytes):
-        if data[: len(HEADER)] != HEADER:
-            raise Malformed("not little-endian CDR")
-        self._data, self._at = memoryview(data)[len(HEADER) :], 0
-
-    def number(self, code: str) -> float:
-        """A number of the struct module's `code`."""
-        kind = _number(code)
-        return kind.unpack(self._take(1, kind.size))[0]
-
-    def array(self, kind: DTypeLike, count: int) -> np.ndarray:
-        """`count` numbers of the NumPy dtype `kind`, an array of their own."""
-        kind = np.dtype(kind).newbyteorder("<")
-        return np.frombuffer(self._take(count, kind.itemsize), kind).copy()
-
-    def text(self) -> str:
-        data = bytes(self._take(int(self.number("I")), 1))
-        if not data.endswith(b"\x00"):
-            raise Malformed("a string without its closing zero")
-        try:
-            return data[:-1].decode()
-        except UnicodeDecodeError:
-            raise Malformed("a string that is not UTF-8") from None
-
-    def done(self) -> None:
-        """Malformed unless all bytes have been read."""
-        if self._at != len(self._data):
-            raise Malformed(f"{len(self._data) - self._at} bytes too many")
-
-    def _take(self, count: int, size: int) -> memoryview:
-        """`count` elements of `size` bytes, which begin at a multiple of `size`."""
-        start = self._at + (-self._at % size if count else 0)
-        if count * size > len(self._data) - start:
-            left = max(len(self._data) - start, 0)
-            raise Malformed(f"{count} x {size} bytes wanted where {left} are left")
-        self._at = start + count * size
-        return self._data[start : self._at]

@@ -2,7 +2,6 @@
 
 from functools import cache
 from importlib.resources import files
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,8 +23,7 @@ DTYPES = {
 }
 
 
-@cache
-def store() -> Typestore:
+def make_store() -> Typestore:
     """Every type of crunchbot/msgs."""
     types = {}
     for package in files("crunchbot").joinpath("msgs").iterdir():
@@ -36,26 +34,28 @@ def store() -> Typestore:
     return made
 
 
+store = cache(make_store)
+
+
 def encode(schema: str, message: Any) -> bytes:
     """Little-endian CDR of an object with an attribute for each field of "package/msg/Type". ValueError when a fixed array has
     another length."""
-    return bytes(store().serialize_cdr(_prepared(schema, message), schema, little_endian=True))
+    return bytes(store().serialize_cdr(prepare(store(), schema, message), schema, little_endian=True))
 
 
-def _prepared(schema: str, message) -> SimpleNamespace:
-    """The message with its numbers as arrays of their types, which rosbags asks for."""
-    values = {}
-    for name, (node, detail) in store().fielddefs[schema][1]:
+def prepare(types: Typestore, schema: str, message: Any) -> Any:
+    """The same message, its numbers now arrays of their types, which rosbags asks for. ValueError as of `encode`."""
+    for name, (node, detail) in types.fielddefs[schema][1]:
         value = getattr(message, name)
         if node is Nodetype.NAME:
-            value = _prepared(detail, value)
+            prepare(types, detail, value)
         elif node is not Nodetype.BASE:
             (inner, kind), length = detail
             if node is Nodetype.ARRAY and len(value) != length:
                 raise ValueError(f"{schema}: {name} has {len(value)} elements, {length} belong; mend the sender")
             if inner is Nodetype.NAME:
-                value = [_prepared(kind, item) for item in value]
+                for item in value:
+                    prepare(types, kind, item)
             elif kind[0] in DTYPES:
-                value = np.ascontiguousarray(value, DTYPES[kind[0]])
-        values[name] = value
-    return SimpleNamespace(**values)
+                setattr(message, name, np.ascontiguousarray(value, DTYPES[kind[0]]))
+    return message

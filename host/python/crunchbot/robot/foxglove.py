@@ -6,10 +6,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import foxglove
+import numpy as np
 from foxglove.websocket import Capability, ServerListener
 
 from ..errors import UserError
 from ..recording.messages import definition
+from .network.messages import Header, Point, Pose, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, encode
 from .standard import types
 from .standard.outlet import Outlet
 from .standard.view import KINDS, POSE_TOPIC, StandardView
@@ -93,19 +95,8 @@ def _pose_of(encoding: str, data: bytes) -> bytes:
     try:
         given = json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
         place, covariance = given.pose.pose, list(given.pose.covariance)
-        made = types.make(
-            "geometry_msgs/PoseWithCovarianceStamped",
-            header=types.make("std_msgs/Header", frame_id=given.header.frame_id),
-            pose=types.make(
-                "geometry_msgs/PoseWithCovariance",
-                pose=types.make(
-                    "geometry_msgs/Pose",
-                    position=types.make("geometry_msgs/Point", **vars(place.position)),
-                    orientation=types.make("geometry_msgs/Quaternion", **vars(place.orientation)),
-                ),
-                covariance=types.doubles(covariance),
-            ),
-        )
-        return types.encode(made)
+        pose = Pose(Point(**vars(place.position)), Quaternion(**vars(place.orientation)))
+        belief = PoseWithCovariance(pose, np.array(covariance, float))
+        return encode(PoseWithCovarianceStamped(Header(frame_id=given.header.frame_id), belief))
     except (AttributeError, TypeError, KeyError, json.JSONDecodeError) as error:
         raise ValueError(f"not a geometry_msgs/PoseWithCovarianceStamped as JSON ({error})") from None

@@ -214,7 +214,7 @@ def to_grid(header: Header, touched: TouchMap) -> OccupancyGrid:
     grid = touched.grid
     per_cent = np.where(grid.occupied == 0.5, -1, np.rint(100.0 * grid.occupied)).astype(np.int8)
     rows, columns = grid.occupied.shape
-    info = MapMetaData(grid.cell, columns, rows, Pose.planar(grid.x, grid.y, 0.0), header.stamp)
+    info = MapMetaData(header.stamp, grid.cell, columns, rows, Pose.planar(grid.x, grid.y, 0.0))
     return OccupancyGrid(header, info, per_cent.ravel())
 
 

@@ -69,7 +69,7 @@ class Publisher:
         header = messages.Header.at(self._stamp_ns, ODOMETRY_FRAME)
         speeds, covariance = np.divide(report.motion, since_s), report.covariance / since_s**2
         pose = messages.PoseWithCovariance(messages.Pose.planar(*self._pose))
-        return messages.Odometry(header, pose, messages.TwistWithCovariance.planar(speeds, covariance))
+        return messages.Odometry(header, pose=pose, twist=messages.TwistWithCovariance.planar(speeds, covariance))
 
     def _joints(self, samples: np.ndarray) -> messages.JointState:
         names = [f"{name}/{axis}" for name in self._pilot.names.values() for axis in ("alpha", "beta")]

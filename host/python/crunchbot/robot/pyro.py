@@ -167,7 +167,7 @@ class Results:
         message: Observation = self._rows.send(row)
         header = Header(message.header.stamp, ODOMETRY_FRAME)
         pose = PoseWithCovariance.planar(message.pose, np.zeros((3, 3)))
-        self._odometries.send(OdometryMessage(header, pose, child_frame_id=BASE_FRAME))
+        self._odometries.send(OdometryMessage(header, BASE_FRAME, pose))
         return message.seq
 
     def _judge(self, row: Observation) -> None:

@@ -6,16 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from crunchbot.recording.types import DTYPES
 from crunchbot.robot.network import messages as m
+from crunchbot.robot.network.judge import MANY, ONE, TEXT, Field, fields_of
 from crunchbot.robot.network.ranges import RANGES
-from crunchbot.robot.network.schema import DTYPES, MANY, ONE, TEXT, Field, fields_of
 
 FLOATS = (math.nan, math.inf, -math.inf, 1e308, -1e308, 3e38, -3e38)
 
 
 def places(schema: str, path: tuple[str, ...] = ()) -> Iterator[tuple[str, tuple[str, ...], Field]]:
     """(schema that holds it, path, field) of each number, text and sequence, those of messages within messages too."""
-    for field in fields_of(schema):
+    for field in fields_of(m.store(), schema):
         here = (*path, field.name)
         if field.kind in DTYPES or field.kind == TEXT or field.count == MANY:
             yield schema, here, field

@@ -32,7 +32,7 @@ def examples() -> dict[str, object]:
         "observation": m.Observation(
             at, 7, o.RELEASE, rng.random(3), rng.random(3), ["l_carpet", "r_mm", "é"], [0, 1, 2], [0.0, 0.0, -3.5]
         ),
-        "odometry": m.Odometry(at, pose, twist, "base"),
+        "odometry": m.Odometry(at, "base", pose, twist),
         "joints": m.JointState(at, ["a/alpha", "a/beta"], [0.5, np.nan], [1.0, 2.0], [3.0]),
         "contact": m.Contact(at, "front", True, m.Time(1, 2), m.Time(3, 4), True, 0.1, 0.005, m.SHAFT, m.CORNER),
         "behaviour": m.Behaviour(at, "forward", m.Time.of(10**10 + 1), "clear"),
@@ -41,7 +41,7 @@ def examples() -> dict[str, object]:
         "belief": m.Belief(at, "grid", 9, 8, 0.875, *components),
         "map": m.OccupancyGrid(
             at,
-            m.MapMetaData(0.03125, 3, 2, m.Pose.planar(-0.5, 0.25, 0.0), m.Time(1, 2)),
+            m.MapMetaData(m.Time(1, 2), 0.03125, 3, 2, m.Pose.planar(-0.5, 0.25, 0.0)),
             np.array([-1, 0, 50, 99, 100, 1], "i1"),
         ),
         "touch_map": m.TouchMap(

@@ -377,7 +377,7 @@ def test_a_mappers_map_is_shown_and_the_truth_in_its_frame():
     forward = 0.5 * math.sin(1.5)
     expected = (0.1 + forward, 0.5 * math.cos(1.5), 0.25)
     assert [model.truth[name] for name in ("x", "y", "theta")] == pytest.approx(expected, abs=1e-3)
-    info = MapMetaData(0.03125, 3, 2, Pose.planar(-0.5, 0.25, 0.0))
+    info = MapMetaData(resolution=0.03125, width=3, height=2, origin=Pose.planar(-0.5, 0.25, 0.0))
     model.take("map", OccupancyGrid(Header.at(ROW_NS), info, np.array([-1, 0, 50, 99, 100, 1], "i1")))
     tiles = [(-1, 1, 0, 0.5), (0, -2, 1, 0.9), (2, 3, 1, 1.0)]
     model.take("touch_map", touch_map(tiles, [[0.5] * 7] * 4, [[0.25] * 3] * 2))

@@ -322,7 +322,7 @@ def test_a_map_takes_the_arenas_place_with_what_was_felt():
     post = Post()
     cells = np.full((40, 60), -1, "i1")
     cells[10:30, 10:50] = 0
-    info = MapMetaData(0.05, 60, 40, Pose.planar(-1.0, -1.0, 0.0))
+    info = MapMetaData(resolution=0.05, width=60, height=40, origin=Pose.planar(-1.0, -1.0, 0.0))
     face = (0.25, -0.5, 0.25, 0.75, np.pi, 0.01, 0.01)
 
     async def scenario():

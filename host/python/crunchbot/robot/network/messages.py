@@ -1,4 +1,5 @@
-"""The robot's messages (crunchbot/msgs) as Python objects, one class a schema; encode and decode are CDR, as ROS 2 has it.
+"""The robot's messages (crunchbot/msgs) as Python objects, one class a schema, its fields in the schema's order; encode and
+decode are CDR, as ROS 2 has it.
 
 Units, meanings and constants are those of the .msg files; what ROS 2 itself defines is in ros. Times are ns of the bridge's
 clock, 0 at its start.
@@ -7,14 +8,18 @@ clock, 0 at its start.
 import math
 import re
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
+from rosbags.typesys.store import Typestore
 
 from ...errors import UserError
 from ...recording.cdr import Malformed
-from ...recording.types import encode as encode_as
-from .ranges import RANGES, ROW
+from ...recording.types import make_store, prepare
+from .judge import OutOfRange
+from .judge import decode as judged
+from .ranges import ROW
 from .ros import (
     Header,
     JointState,
@@ -33,7 +38,6 @@ from .ros import (
     TwistWithCovariance,
     Vector3,
 )
-from .schema import Codec, OutOfRange
 
 UNKNOWN, TIP, SHAFT = range(3)  # Contact.part
 FACE, CORNER = 1, 2  # Contact.shape; or UNKNOWN
@@ -173,7 +177,6 @@ PACKAGES = {
 }
 TYPES = {f"{package}/msg/{kind.__name__}": kind for package, kinds in PACKAGES.items() for kind in kinds}
 SCHEMAS = {kind: schema for schema, kind in TYPES.items()}
-CODEC = Codec(TYPES, RANGES)
 ROUNDING = 1e-6  # relative, of sums
 REMEDIES = ("install one release of whisker on both sides", "stop what sends it")  # not readable; not possible
 
@@ -196,6 +199,14 @@ HEALTH = "health"
 NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")  # of a process or a robot
 
 
+@cache
+def store() -> Typestore:
+    """The types of crunchbot/msgs, whose messages are objects of the classes here."""
+    made = make_store()
+    made.types.update(TYPES)
+    return made
+
+
 def type_of(topic: str) -> type:
     """The class of a topic's messages; KeyError when there is no such topic."""
     kind, _, process = topic.partition("/")
@@ -204,13 +215,14 @@ def type_of(topic: str) -> type:
 
 def encode(message: Any) -> bytes:
     """CDR of a message; ValueError when a fixed array has another length than its schema says."""
-    return encode_as(SCHEMAS[type(message)], message)
+    schema = SCHEMAS[type(message)]
+    return bytes(store().serialize_cdr(prepare(store(), schema, message), schema, little_endian=True))
 
 
 def decode(kind: type, data: bytes, topic: str = "") -> Any:
     """A message of class `kind`; MessageError names `topic`, field and remedy."""
     try:
-        message = CODEC.decode(data, SCHEMAS[kind])
+        message = judged(store(), data, SCHEMAS[kind])
         CHECKS.get(kind, _check_nothing)(message)
     except Malformed as error:
         remedy = REMEDIES[isinstance(error, OutOfRange)]

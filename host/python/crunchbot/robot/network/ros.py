@@ -1,4 +1,5 @@
-"""Messages that ROS 2 itself defines, as Python objects: fields and units are those of its .msg files (crunchbot/msgs)."""
+"""Messages that ROS 2 itself defines, as Python objects: fields, their order and their units are those of its .msg files
+(crunchbot/msgs)."""
 
 import math
 from collections.abc import Sequence
@@ -141,9 +142,9 @@ class Odometry:
     """
 
     header: Header
-    pose: PoseWithCovariance
-    twist: TwistWithCovariance = field(default_factory=TwistWithCovariance)
     child_frame_id: str = BASE_FRAME
+    pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
+    twist: TwistWithCovariance = field(default_factory=TwistWithCovariance)
 
 
 @dataclass(eq=False)
@@ -161,11 +162,11 @@ class JointState:
 class MapMetaData:
     """origin: pose of the corner of cell 0; resolution: m a cell."""
 
-    resolution: float
-    width: int
-    height: int
-    origin: Pose
     map_load_time: Time = field(default_factory=Time)
+    resolution: float = 0.0
+    width: int = 0
+    height: int = 0
+    origin: Pose = field(default_factory=Pose)
 
 
 @dataclass(eq=False)

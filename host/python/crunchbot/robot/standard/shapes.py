@@ -1,12 +1,12 @@
 """Arena, belief and robot as grids and markers: pictures of a scene in standard messages."""
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from ...scene import Arena, Robot
+from ..network.ros import Header, MapMetaData, OccupancyGrid, Point, Pose, Vector3
 from .types import make
 
 CELLS_MOST = 1000  # along a side of a map
@@ -24,14 +24,15 @@ BODY, FREE_WHISKER, TOUCHING, TIP = (
 )
 
 
-def pose(x: float, y: float, theta: float = 0.0, z: float = 0.0) -> SimpleNamespace:
+def pose(x: float, y: float, theta: float = 0.0, z: float = 0.0) -> Pose:
     """m and rad."""
-    turn = make("geometry_msgs/Quaternion", z=math.sin(theta / 2.0), w=math.cos(theta / 2.0))
-    return make("geometry_msgs/Pose", position=make("geometry_msgs/Point", x=x, y=y, z=z), orientation=turn)
+    made = Pose.planar(x, y, theta)
+    made.position.z = z
+    return made
 
 
-def occupancy(arena: Arena, header: SimpleNamespace) -> SimpleNamespace:
-    """nav_msgs/OccupancyGrid of boxes, of ground that was never mapped, and of the walls as a border of one cell."""
+def occupancy(arena: Arena, header: Header) -> OccupancyGrid:
+    """Of boxes, of ground that was never mapped, and of the walls as a border of one cell."""
     cell = max(MAP_CELL_M, max(arena.size_m) / CELLS_MOST)
     columns, rows = (math.ceil(size / cell - 1e-9) for size in arena.size_m)
     cells = np.full((rows + 2, columns + 2), SOLID, np.int8)
@@ -43,8 +44,8 @@ def occupancy(arena: Arena, header: SimpleNamespace) -> SimpleNamespace:
     return _grid(cells, cell, (-cell, -cell), header)
 
 
-def belief(message: Any, arena: Arena, header: SimpleNamespace) -> SimpleNamespace:
-    """nav_msgs/OccupancyGrid of a belief's mass: 100 in the cell that holds most."""
+def belief(message: Any, arena: Arena, header: Header) -> OccupancyGrid:
+    """Of a belief's mass: 100 in the cell that holds most."""
     cell = max(BELIEF_CELL_M, max(arena.size_m) / CELLS_MOST)
     columns, rows = (max(1, math.ceil(size / cell - 1e-9)) for size in arena.size_m)
     mass = np.zeros((rows, columns))
@@ -55,13 +56,13 @@ def belief(message: Any, arena: Arena, header: SimpleNamespace) -> SimpleNamespa
     return _grid(np.rint(100 * share).astype(np.int8), cell, (0.0, 0.0), header)
 
 
-def _grid(cells: np.ndarray, cell_m: float, origin: tuple[float, float], header: SimpleNamespace) -> SimpleNamespace:
+def _grid(cells: np.ndarray, cell_m: float, origin: tuple[float, float], header: Header) -> OccupancyGrid:
     rows, columns = cells.shape
-    info = make("nav_msgs/MapMetaData", resolution=cell_m, width=columns, height=rows, origin=pose(*origin))
-    return make("nav_msgs/OccupancyGrid", header=header, info=info, data=cells.ravel())
+    info = MapMetaData(resolution=cell_m, width=columns, height=rows, origin=pose(*origin))
+    return OccupancyGrid(header, info, cells.ravel())
 
 
-def robot_markers(robot: Robot, touching: dict[str, float], header: SimpleNamespace) -> SimpleNamespace:
+def robot_markers(robot: Robot, touching: dict[str, float], header: Header) -> Any:
     """visualization_msgs/MarkerArray of body and whiskers in the robot's frame. touching: by whisker, the distance of its
     contact from its base, m, or nan where that is not known."""
     diameter = 2.0 * robot.body_radius_m
@@ -86,9 +87,7 @@ def robot_markers(robot: Robot, touching: dict[str, float], header: SimpleNamesp
             (WHISKER_M, 0.0, 0.0),
             pose(0.0, 0.0),
         )
-        line.points = [
-            make("geometry_msgs/Point", x=x + d * c, y=y + d * s, z=BODY_HEIGHT_M / 2) for d in (0.0, length)
-        ]
+        line.points = [Point(x + d * c, y + d * s, BODY_HEIGHT_M / 2) for d in (0.0, length)]
         made.append(line)
         end = _marker(
             header,
@@ -104,7 +103,7 @@ def robot_markers(robot: Robot, touching: dict[str, float], header: SimpleNamesp
     return make("visualization_msgs/MarkerArray", markers=made)
 
 
-def _marker(header, namespace: str, number: int, kind: int, colour, scale, place) -> SimpleNamespace:
+def _marker(header, namespace: str, number: int, kind: int, colour, scale, place) -> Any:
     red, green, blue, opacity = colour
     x, y, z = scale
     return make(
@@ -114,7 +113,7 @@ def _marker(header, namespace: str, number: int, kind: int, colour, scale, place
         id=number,
         type=kind,
         pose=place,
-        scale=make("geometry_msgs/Vector3", x=x, y=y, z=z),
+        scale=Vector3(x, y, z),
         color=make("std_msgs/ColorRGBA", r=red, g=green, b=blue, a=opacity),
         frame_locked=True,
     )

@@ -1,14 +1,18 @@
-"""Standard messages of ROS 2 (Jazzy), made by name, and their encoding, definition and hash, by rosbags."""
+"""Standard messages of ROS 2 (Jazzy), made by name, and their encoding, definition and hash, by rosbags.
+
+Those that the robot's processes use too are objects of the same classes (network.ros); the others are rosbags' own.
+"""
 
 from functools import cache
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
+
+from ...recording.types import prepare
+from ..network.messages import SCHEMAS, TYPES
 
 EMPTY = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}
 OCTETS = ("byte", "char")  # as NumPy names neither
@@ -16,20 +20,21 @@ OCTETS = ("byte", "char")  # as NumPy names neither
 
 @cache
 def store() -> Typestore:
-    return get_typestore(Stores.ROS2_JAZZY)
+    made = get_typestore(Stores.ROS2_JAZZY)
+    made.types.update({schema: kind for schema, kind in TYPES.items() if schema in made.types})
+    return made
 
 
-def make(kind: str, **fields: Any) -> SimpleNamespace:
+def make(kind: str, **fields: Any) -> Any:
     """A message "package/Type" with these fields; the others are empty. TypeError for a field that it does not have."""
-    empty = _empty_fields(kind)
-    if not fields.keys() <= empty.keys():
-        raise TypeError(f"{kind} has no field {', '.join(sorted(fields.keys() - empty.keys()))}")
-    return SimpleNamespace(**empty | fields)
+    empty = {} if _full(kind) in TYPES else _empty_fields(kind)
+    return store().types[_full(kind)](**empty | fields)
 
 
-def encode(message: SimpleNamespace) -> bytes:
+def encode(message: Any) -> bytes:
     """Little-endian CDR."""
-    return bytes(store().serialize_cdr(message, message.__kind__, little_endian=True))
+    schema = SCHEMAS.get(type(message)) or message.__msgtype__
+    return bytes(store().serialize_cdr(prepare(store(), schema, message), schema, little_endian=True))
 
 
 def decode(kind: str, data: bytes) -> Any:
@@ -42,11 +47,6 @@ def definition(kind: str) -> str:
     return store().generate_msgdef(_full(kind), ros_version=2)[0]
 
 
-def doubles(values: ArrayLike) -> np.ndarray:
-    """Numbers as the encoder asks for them. ValueError: they are none."""
-    return np.ascontiguousarray(values, np.float64)
-
-
 def type_hash(kind: str) -> str:
     """RIHS01 of REP 2016."""
     return store().hash_rihs01(_full(kind))
@@ -55,8 +55,7 @@ def type_hash(kind: str) -> str:
 @cache
 def _empty_fields(kind: str) -> dict:
     """Shared by all messages of a kind: a field is replaced, never changed."""
-    fields = {name: _empty(*of) for name, of in store().fielddefs[_full(kind)][1]}
-    return {"__kind__": _full(kind)} | fields
+    return {name: _empty(*of) for name, of in store().fielddefs[_full(kind)][1]}
 
 
 def _full(kind: str) -> str:

@@ -8,7 +8,6 @@ import math
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,10 +17,21 @@ from ...pilot.pilot import compose
 from ...scene import Scene
 from ..log_clock import LogClock
 from ..network.messages import HEALTH, End
-from ..network.ros import BASE_FRAME, MAP_FRAME, ODOMETRY_FRAME
+from ..network.ros import (
+    BASE_FRAME,
+    MAP_FRAME,
+    ODOMETRY_FRAME,
+    Header,
+    JointState,
+    OccupancyGrid,
+    Odometry,
+    Pose,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Vector3,
+)
 from ..network.rows import between
 from . import shapes
-from .shapes import pose
 from .types import make
 
 PATH_MOST, PATH_EVERY = 600, 10  # poses kept; rows from one to the next
@@ -51,7 +61,7 @@ class Standard:
 
     topic: str
     stamp_ns: int
-    message: SimpleNamespace
+    message: Any
 
 
 class StandardView:
@@ -71,7 +81,7 @@ class StandardView:
 
     def first(self) -> Iterator[Standard]:
         now = self._clock.latest
-        yield Standard("/map", now, shapes.occupancy(self._scene.arena, _header(now, MAP_FRAME)))
+        yield Standard("/map", now, shapes.occupancy(self._scene.arena, Header.at(now, MAP_FRAME)))
 
     def take(self, topic: str, message: Any) -> Iterator[Standard]:
         """A message of a topic of network.messages.TOPICS, or of health."""
@@ -91,7 +101,7 @@ class StandardView:
             column = self._scene.layout.get(name)
             if column is not None and column.quantity is Quantity.DISTANCE and cell == VALUE:
                 self._touching[column.whisker] = value / 1000.0
-        markers = shapes.robot_markers(self._scene.robot, self._touching, _header(wall_ns, BASE_FRAME))
+        markers = shapes.robot_markers(self._scene.robot, self._touching, Header.at(wall_ns, BASE_FRAME))
         yield Standard("/robot", wall_ns, markers)
 
     def _take_odometry(self, odometry, stamp_ns: int, wall_ns: int) -> Iterator[Standard]:
@@ -99,19 +109,16 @@ class StandardView:
         before = self._odometry[-1][3] if self._odometry else 0.0
         self._odometry.append((stamp_ns, *place[:2], before + math.remainder(place[2] - before, math.tau)))
         yield _transform(wall_ns, ODOMETRY_FRAME, BASE_FRAME, place)
-        fields = {"pose": odometry.pose, "twist": odometry.twist, "child_frame_id": BASE_FRAME}
-        yield Standard(
-            "/odom", wall_ns, make("nav_msgs/Odometry", header=_header(wall_ns, ODOMETRY_FRAME), **_arrays(fields))
-        )
+        header = Header.at(wall_ns, ODOMETRY_FRAME)
+        yield Standard("/odom", wall_ns, Odometry(header, BASE_FRAME, odometry.pose, odometry.twist))
 
     def _take_pose(self, reported, stamp_ns: int, wall_ns: int) -> Iterator[Standard]:
-        place, header = np.array(reported.pose.pose.xytheta), _header(wall_ns, MAP_FRAME)
-        fields = _arrays({"pose": reported.pose})
-        yield Standard("/pose", wall_ns, make("geometry_msgs/PoseWithCovarianceStamped", header=header, **fields))
+        place, header = np.array(reported.pose.pose.xytheta), Header.at(wall_ns, MAP_FRAME)
+        yield Standard("/pose", wall_ns, PoseWithCovarianceStamped(header, reported.pose))
         if (odometry := self._odometry_at(stamp_ns)) is not None:
             yield _transform(wall_ns, MAP_FRAME, ODOMETRY_FRAME, compose(place, between(odometry, np.zeros(3))))
         if self._rows % PATH_EVERY == 0:
-            self._path.append(make("geometry_msgs/PoseStamped", header=header, pose=pose(*place)))
+            self._path.append(PoseStamped(header, Pose.planar(*map(float, place))))
             yield Standard("/path", wall_ns, make("nav_msgs/Path", header=header, poses=list(self._path)))
         self._rows += 1
 
@@ -134,28 +141,21 @@ class StandardView:
     def _take_belief(self, reported, _: int, wall_ns: int) -> Iterator[Standard]:
         if reported.filter != self._filter:
             return
-        grid = shapes.belief(reported, self._scene.arena, _header(wall_ns, MAP_FRAME))
+        grid = shapes.belief(reported, self._scene.arena, Header.at(wall_ns, MAP_FRAME))
         yield Standard("/belief", wall_ns, grid)
 
     def _take_map(self, grid, _: int, wall_ns: int) -> Iterator[Standard]:
         """A mapper's, in place of the scene's."""
-        info = make("nav_msgs/MapMetaData", **vars(grid.info))
-        fields = {"header": _header(wall_ns, MAP_FRAME), "info": info, "data": np.asarray(grid.data, np.int8)}
-        yield Standard("/map", wall_ns, make("nav_msgs/OccupancyGrid", **fields))
+        yield Standard("/map", wall_ns, OccupancyGrid(Header.at(wall_ns, MAP_FRAME), grid.info, grid.data))
 
     def _take_joints(self, joints, _: int, wall_ns: int) -> Iterator[Standard]:
-        angles = np.asarray(joints.position, float)
-        message = make(
-            "sensor_msgs/JointState", header=_header(wall_ns, BASE_FRAME), name=list(joints.name), position=angles
-        )
+        message = JointState(Header.at(wall_ns, BASE_FRAME), joints.name, joints.position)
         yield Standard("/joint_states", wall_ns, message)
 
     def _take_truth(self, truth, _: int, wall_ns: int) -> Iterator[Standard]:
-        message = make("geometry_msgs/PoseStamped", header=_header(wall_ns, MAP_FRAME), pose=truth.pose)
-        yield Standard("/truth", wall_ns, message)
+        yield Standard("/truth", wall_ns, PoseStamped(Header.at(wall_ns, MAP_FRAME), truth.pose))
 
     def _take_health(self, health, _: int, wall_ns: int) -> Iterator[Standard]:
-        values = [make("diagnostic_msgs/KeyValue", key=pair.key, value=pair.value) for pair in health.counters]
         text = health.last_error or health.state
         status = make(
             "diagnostic_msgs/DiagnosticStatus",
@@ -163,32 +163,17 @@ class StandardView:
             name=f"{HEALTH}: {health.process}",
             message=text,
             hardware_id=str(health.pid),
-            values=values,
+            values=health.counters,
         )
-        array = make("diagnostic_msgs/DiagnosticArray", header=_header(wall_ns, ""), status=[status])
+        array = make("diagnostic_msgs/DiagnosticArray", header=Header.at(wall_ns, ""), status=[status])
         yield Standard("/diagnostics", wall_ns, array)
-
-
-def _header(ns: int, frame: str) -> SimpleNamespace:
-    stamp = make("builtin_interfaces/Time", sec=ns // 10**9, nanosec=ns % 10**9)
-    return make("std_msgs/Header", stamp=stamp, frame_id=frame)
-
-
-def _arrays(fields: dict) -> dict:
-    """Poses and twists with their covariance as an array, which the encoder asks for."""
-    for value in fields.values():
-        if hasattr(value, "covariance"):
-            value.covariance = np.ascontiguousarray(value.covariance, float)
-    return fields
 
 
 def _transform(ns: int, parent: str, child: str, place: np.ndarray) -> Standard:
     x, y, theta = map(float, place)
-    at = pose(x, y, theta)
-    moved = make(
-        "geometry_msgs/Transform",
-        translation=make("geometry_msgs/Vector3", x=x, y=y),
-        rotation=at.orientation,
+    turn = Pose.planar(x, y, theta).orientation
+    moved = make("geometry_msgs/Transform", translation=Vector3(x, y), rotation=turn)
+    stamped = make(
+        "geometry_msgs/TransformStamped", header=Header.at(ns, parent), child_frame_id=child, transform=moved
     )
-    stamped = make("geometry_msgs/TransformStamped", header=_header(ns, parent), child_frame_id=child, transform=moved)
     return Standard("/tf", ns, make("tf2_msgs/TFMessage", transforms=[stamped]))

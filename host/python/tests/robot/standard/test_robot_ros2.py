@@ -71,7 +71,7 @@ def test_hashes_tokens_keys_and_ids_are_those_of_other_implementations():
 
 def test_a_pose_is_encoded_as_others_encode_it():
     header = types.make("std_msgs/Header", frame_id="map")
-    covariance = types.doubles(np.diag([0.01, 0.01, 0, 0, 0, 0.04]).ravel())
+    covariance = np.diag([0.01, 0.01, 0, 0, 0, 0.04]).ravel()
     belief = types.make("geometry_msgs/PoseWithCovariance", pose=shapes.pose(1.25, 0.75), covariance=covariance)
     assert types.encode(types.make(POSE_KIND, header=header, pose=belief)) == POSE
 

@@ -32,7 +32,7 @@ STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f
 
 
 def odometry(stamp_ns: int, pose) -> Odometry:
-    return Odometry(m.Header.at(stamp_ns, "odom"), m.PoseWithCovariance(m.Pose.planar(*pose)))
+    return Odometry(m.Header.at(stamp_ns, "odom"), pose=m.PoseWithCovariance(m.Pose.planar(*pose)))
 
 
 def located(stamp_ns: int, pose) -> m.PoseWithCovarianceStamped:
