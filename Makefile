@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-rtl demo-map demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build build-demo setup setup-demo setup-tests example-data docs manual gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-rtl demo-map demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build build-demo setup setup-demo setup-tests example-data docs gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -85,9 +85,6 @@ docs: build ## pages and API of C and Python as a site, every warning an error: 
 	@command -v doxygen >/dev/null || { if [ "$$(id -u)" -eq 0 ]; then SUDO=; else SUDO=sudo; fi; \
 		$$SUDO apt-get install -y -qq doxygen >/dev/null || { echo "docs: Doxygen could not be installed; run: apt-get install doxygen" >&2; exit 1; }; }
 	@cd tools && ../$(PYTHON) -m handbook --build-dir ../$(BUILD) $(if $(EXTERNAL),--external)
-
-manual: build ## write manual pages and shell completion again, after a change of options: host/manual
-	@cd tools && ../$(PYTHON) -m manual
 
 gen: setup ## regenerate protocol/gen from protocol/whisker.toml
 	@$(PYTHON) tools/protogen.py

@@ -26,6 +26,18 @@ function(whisker_install_library name)
             DESTINATION \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_LIBDIR}/pkgconfig\")")
 endfunction()
 
+# A program's manual page, by help2man of what its --help says; none where help2man is not installed.
+find_program(HELP2MAN help2man)
+function(whisker_install_page program summary)
+    if(HELP2MAN)
+        install(CODE "
+            set(page \"${CMAKE_CURRENT_BINARY_DIR}/${program}.1\")
+            execute_process(COMMAND ${HELP2MAN} --no-info --name \"${summary}\" --output \${page}
+                $<TARGET_FILE:${program}> COMMAND_ERROR_IS_FATAL ANY)
+            file(INSTALL \${page} DESTINATION \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_MANDIR}/man1\")")
+    endif()
+endfunction()
+
 # The CMake package of all libraries.
 function(whisker_install_package)
     set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/whisker)

@@ -56,6 +56,15 @@ def examples(prefix, tmp_path_factory) -> Path:
     return where
 
 
+def test_each_program_has_a_manual_page_of_its_help(prefix):
+    tool("help2man")
+    for name in ("whiskerd", "whisker-log", "whisker-flash", "whisker-base"):
+        page = (prefix / f"share/man/man1/{name}.1").read_text().replace("\\-", "-")
+        assert set(re.findall(r"^  (--[\w-]+)", run(program(name), "--help"), re.MULTILINE)) - {"--help"} <= set(
+            re.findall(r"--[\w-]+", page)
+        )
+
+
 def test_pkg_config_and_plain_cc_build_the_example(prefix, tmp_path):
     environment = {"PATH": "/usr/bin:/bin", "PKG_CONFIG_PATH": str(prefix / "lib/pkgconfig")}
     for library in LIBRARIES:

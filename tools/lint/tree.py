@@ -9,7 +9,6 @@ TEXT |= {".cmake", ".in", ".msg", ".rules", ".conf", ".rs", ".pml", ".yml", ".ya
 # What a tool or another program wrote: its words and layout are not ours.
 GENERATED = (
     "protocol/gen/",
-    "host/manual/",
     "bench/results/",
     "firmware/images/",
     "requirements.lock",

@@ -5,9 +5,13 @@ imported, so that help is quick.
 """
 
 import argparse
+import contextlib
 import importlib
 import sys
+from collections.abc import Iterator
+from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from . import __version__
 from .arguments import Parser
@@ -53,6 +57,7 @@ EXTRAS = {
     **dict.fromkeys(("localise", "map", "calibrate", "scene"), "scenes"),
 }
 PACKAGE_EXTRAS = {"cyclonedds": "cyclonedds"}  # of a package that only one way of a command needs
+SHELLS = ("bash", "zsh", "tcsh")
 LAB_COMMANDS = ("bridge-sim", "scene", "bench")  # of the package crunchbot_lab
 
 
@@ -77,26 +82,60 @@ def _run_command(words: list[str]) -> int:
     return arguments.run(arguments)
 
 
-def parser_of(chosen: str) -> Parser:
-    """The parser of the whole command line, with the arguments of the chosen subcommand only."""
+class PrintCompletion(argparse.Action):
+    """Prints what a shell needs to complete the command line, by shtab, and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, shell: Any, option: str | None = None) -> None:
+        import shtab
+
+        whole = parser_of()
+        for action in _actions_of(whole):
+            if action.type in (Path, None) and action.nargs != 0 and not action.choices:
+                action.complete = shtab.FILE
+        print(shtab.complete(whole, shell))
+        parser.exit()
+
+
+def _actions_of(parser: argparse.ArgumentParser) -> Iterator[Any]:
+    """Every argument, those of subcommands too."""
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for inner in action.choices.values():
+                yield from _actions_of(inner)
+
+
+def parser_of(chosen: str | None = None) -> Parser:
+    """The parser of the whole command line, with the arguments of the chosen subcommand only; None: of all whose packages
+    are installed."""
     width = max(map(len, COMMANDS))
     listed = "\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())
     purpose = "Whiskered robots: sensing, tactile perception, localisation by touch."
     parser = Parser(
-        prog="whisker", usage="whisker [--version] COMMAND ...", description=f"{purpose}\n\ncommands:\n{listed}"
+        prog="whisker",
+        usage="whisker [--version] [--print-completion SHELL] COMMAND ...",
+        description=f"{purpose}\n\ncommands:\n{listed}",
     )
     parser.show_example("whisker bridge-sim &  whisker top")
     parser.add_argument("--version", action="version", version=f"whisker {__version__}")
-    commands = parser.add_subparsers(
-        prog="whisker", dest="command", required=True, metavar="COMMAND", help=argparse.SUPPRESS
-    )
+    text = f"print completion for a shell ({', '.join(SHELLS)}) and exit"
+    parser.add_argument("--print-completion", action=PrintCompletion, choices=SHELLS, metavar="SHELL", help=text)
+    hidden = None if chosen is None else argparse.SUPPRESS  # the list above is of them; shtab asks for an entry
+    commands = parser.add_subparsers(prog="whisker", dest="command", required=True, metavar="COMMAND", help=hidden)
     for name, text in COMMANDS.items():
-        command = commands.add_parser(name, description=text)
+        command = commands.add_parser(name, help=text, description=text)
         if name == chosen:
-            module = command_module(name)
-            command.show_example(module.EXAMPLE)
-            module.add(command)
+            _fill(command, name)
+        elif chosen is None:
+            with contextlib.suppress(ModuleNotFoundError, UserError):
+                _fill(command, name)
     return parser
+
+
+def _fill(command: Parser, name: str) -> None:
+    module = command_module(name)
+    command.show_example(module.EXAMPLE)
+    module.add(command)
 
 
 def command_module(name: str) -> ModuleType:

@@ -3,6 +3,7 @@
 # ruff: noqa: F811 - fixtures are taken by their names
 
 import json
+import subprocess
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from folders import folder, recorded  # noqa: F401 - fixtures
 from PIL import Image
 from whisks import write_whisks
 
-from crunchbot import scene
+from crunchbot import cli, scene
 from crunchbot.nav import localise
 
 
@@ -220,3 +221,25 @@ def test_an_occupancy_map_stands_beside_or_in_place_of_an_arena(folder, tmp_path
     mean = scene.load(folder, tmp_path / "map.yaml").prior.mean
     (tmp_path / "map.yaml").write_text(text.format("0.15, -0.25, 0"))
     assert scene.load(folder, tmp_path / "map.yaml").prior.mean == pytest.approx(np.subtract(mean, (0.2, -0.2, 0.0)))
+
+
+def completed(script: str, *words: str) -> list[str]:
+    """What bash offers for the last word."""
+    line = " ".join(f"'{word}'" for word in words)
+    ask = f"""{script}
+COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _shtab_whisker; printf '%s\\n' "${{COMPREPLY[@]}}" """
+    return subprocess.run(["bash", "-c", ask], capture_output=True, text=True, check=True).stdout.split()
+
+
+def test_shells_get_completion(capsys, tmp_path, monkeypatch):
+    scripts = {}
+    for shell in cli.SHELLS:
+        code, scripts[shell], _ = run(capsys, "--print-completion", shell)
+        assert code == 0 and "print-completion" in scripts[shell] and "method" in scripts[shell]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "model.json").touch()
+    script = scripts["bash"]
+    assert completed(script, "whisker", "te") == ["texture"]
+    assert completed(script, "whisker", "texture", "train", "--m") == ["--method"]
+    assert completed(script, "whisker", "texture", "train", "--method", "") == ["naive-bayes", "default"]
+    assert completed(script, "whisker", "texture", "train", "--out", "mo") == ["model.json"]
