@@ -1,14 +1,14 @@
 """The adapter for eight nodes: four 74LVC244 with series resistors, eight cables, two Pmod headers, fused 5 V."""
 
-from node import CABLE, NOT_BUILT, R0603, R10K, capacitor
+from node import CABLE, NOT_BUILT, R0603, R10K, R100K, capacitor
 from schematic import Part, Sheet
 
 LINES = ("SYNC", "SCK", "SELECT", "MOSI")
 INPUTS = (("2", "4", "6", "8"), ("17", "15", "13", "11"))  # 1A0 to 1A3, 2A0 to 2A3
 OUTPUTS = (("18", "16", "14", "12"), ("3", "5", "7", "9"))  # 1Y0 to 1Y3, 2Y0 to 2Y3
 PITCH = 10.922
-PACK = [("to be chosen", "4 isolated x 47 ohm, 5 %, 3.2 x 1.6 mm convex (series Bourns CAY16, Panasonic EXB-38V)")]
-BOX_2X6 = [("to be chosen", "box header 2x6, 2.54 mm, straight, keyed")]
+PACK = [("Bourns", "CAY16-470J4LF"), ("Panasonic", "EXB-38V470JV")]
+BOX_2X6 = [("Adam Tech", "BHR-12-VUA"), ("Würth Elektronik", "61201221621")]
 PMOD = "Connector_IDC:IDC-Header_2x06_P2.54mm_Vertical"
 
 
@@ -67,34 +67,43 @@ PARTS += [
          "TerminalBlock_Phoenix:TerminalBlock_Phoenix_MKDS-1,5-2-5.08_1x02_P5.08mm_Horizontal", (132, 58),
          {"1": "=+5V_IN", "2": "GND"}, (6.35, 66.04, 270), sources=[("Phoenix Contact", "1715721"), ("On Shore Technology", "OSTTC022162")],
          what="screw terminal 2-way, 5.08 mm", text=(1, -1.4)),
-    Part("F1", "Device:Polyfuse", "1.1A", "Fuse:Fuse_1812_4532Metric", (139, 57), {"1": "=+5V_IN", "2": "=+5V"},
+    Part("F1", "Device:Polyfuse", "1.1A", "Fuse:Fuse_1812_4532Metric", (139, 57), {"1": "=+5V_IN", "2": "=+5V_FUSED"},
          (15.24, 61.468, 0), turn=90, sources=[("Bourns", "MF-MSMF110/16-2"), ("Littelfuse", "1812L110/16DR")],
          what="resettable fuse, holds 1.1 A, 16 V, 1812"),
-    Part("C5", "Device:C_Polarized", "100u", "Capacitor_THT:CP_Radial_D6.3mm_P2.50mm", (146, 58.5),
-         {"1": "=+5V", "2": "GND"}, (15.494, 68.58, 270), sources=[("Panasonic", "EEU-FR1C101"), ("to be chosen", "100 uF, 16 V, radial 6.3 mm, lead spacing 2.5 mm")],
-         what="aluminium electrolytic, 16 V, 6.3 mm, lead spacing 2.5 mm"),
-    *[Part(f"H{n}", "Mechanical:MountingHole", "M3", "MountingHole:MountingHole_3.2mm_M3", (125 + 6 * n, 79), {},
+    Part("D1", "Device:D_TVS", "SMBJ5.0CA", "Diode_SMD:D_SMB", (144, 58.5), {"1": "GND", "2": "=+5V_FUSED"},
+         (8.128, 78.74, 0), turn=90, sources=[("Littelfuse", "SMBJ5.0CA"), ("Bourns", "SMBJ5.0CA")],
+         what="clamps either way: 6.4 to 7 V, 9.2 V at most", text=(-0.8, 0.7)),
+    Part("Q1", "Transistor_FET:AO3401A", "AO3401A", "Package_TO_SOT_SMD:SOT-23", (150, 58),
+         {"1": "=GATE", "2": "=+5V", "3": "=+5V_FUSED"}, (15.748, 77.724, 0), turn=90,
+         sources=[("Alpha & Omega Semiconductor", "AO3401A"), ("Infineon", "IRLML6402TRPBF")],
+         what="no current when the wires are swapped; gate-source 12 V", text=(-2.5, -3)),
+    Part("R9", "Device:R", "100k", R0603, (150, 62), {"1": "=GATE", "2": "GND"}, (15.748, 81.534, 0), sources=R100K,
+         what="gate of Q1"),
+    Part("C5", "Device:C_Polarized", "100u", "Capacitor_THT:CP_Radial_D6.3mm_P2.50mm", (156, 58.5),
+         {"1": "=+5V", "2": "GND"}, (15.494, 68.58, 270), sources=[("Panasonic", "EEU-FR1E101"), ("Nichicon", "UVR1E101MED")],
+         what="aluminium electrolytic, 25 V, 6.3 mm, lead spacing 2.5 mm"),
+    *[Part(f"H{n}", "Mechanical:MountingHole", "M3", "MountingHole:MountingHole_3.2mm_M3", (125 + 6 * n, 84), {},
            place, in_bom=False, what="screw") for n, place in
       enumerate([(4, 4, 0), (67, 3.5, 0), (4, 91.5, 0), (67, 91.5, 0)], 1)],
 ]  # fmt: skip
 SHEET = Sheet(
     "adapter", "Adapter for eight whisker nodes",
-    [NOT_BUILT, "Cable and buffers: docs/hardware.md", "Made by hardware/make/make.py"],
+    [NOT_BUILT, "Cable, buffers, supply: docs/hardware.md"],
     PARTS,
     wires=[wire for _, wires, _ in BUFFERS for wire in wires]
-    + [[(130, 58), (128, 58), (128, 55), (136, 55), (136, 57), (137.5, 57)], [(140.5, 57), (149, 57)]],
-    labels=[label for _, _, labels in BUFFERS for label in labels] + [(129, 55, "+5V_IN", 1)],
-    rails=[(149, 57, "+5V")],
-    flags=[(130, 70, "+3V3"), (138, 70, "GND"), (146, 70, "+5V")],
+    + [[(130, 58), (128, 58), (128, 55), (136, 55), (136, 57), (137.5, 57)], [(140.5, 57), (148, 57)], [(152, 57), (159, 57)], [(150, 60), (150, 60.5)]],
+    labels=[label for _, _, labels in BUFFERS for label in labels] + [(129, 55, "+5V_IN", 1), (140.7, 57, "+5V_FUSED", 1), (150, 60.25, "GATE", 1)],
+    rails=[(159, 57, "+5V")],
+    flags=[(130, 75, "+3V3"), (138, 75, "GND"), (146, 75, "+5V")],
     boxes=[(6, 6, 122, 71, "Buffers: one output and one series resistor per cable and line"),
            (6, 73, 116, 102, "Cables: J1 to J8 go to nodes 1 to 8; a lane without a node reads ones"),
-           (126, 6, 158, 49, "To the FPGA board: Pmod pattern, 3.3 V"),
-           (126, 50, 158, 62, "5 V for eight nodes, not from USB"),
-           (126, 63, 158, 84, "Fed from outside; screws M3")],
+           (126, 6, 162, 49, "To the FPGA board: Pmod pattern, 3.3 V"),
+           (126, 50, 162, 67, "5 V for eight nodes, not from USB"),
+           (126, 68, 162, 89, "Fed from outside; screws M3")],
     notes=[(127, 45, "Odd pins are the Pmod's row 1 to 6, even pins its row 7 to 12.")],
     paper="A3",
     outline=(0, 0, 71.12, 95.25),
     silk=[(25, 93.5, 1.0, "CrunchBot adapter 8 rev A"), (36, 1.2, 0.8, "NOT YET BUILT")],
-    power_nets=("+5V", "+3V3", "+5V_IN"),
+    power_nets=("+5V", "+3V3", "+5V_IN", "+5V_FUSED"),
     step=0.254,
 )  # fmt: skip
