@@ -23,7 +23,7 @@ struct nav_particles {
     float *memory, *spare;
 };
 
-/* odometry: with columns for its errors, gains of standard deviation `spread`. 0, or -1 without memory;
+/* odometry: with columns for its errors, gains of standard deviation `spread`, and for modes. 0, or -1 without memory;
  * nav_particles_free either way. */
 int nav_particles_init(struct nav_particles *, long room, bool odometry, double spread);
 void nav_particles_free(struct nav_particles *);

@@ -65,7 +65,6 @@ extern const struct nav_filter_ops nav_foveal_filter;   /* the paper's, equation
 extern const struct nav_filter_ops nav_grid_filter;     /* exact, equation 4 */
 extern const struct nav_filter_ops nav_particle_filter; /* Monte-Carlo localisation */
 extern const struct nav_filter_ops nav_adaptive_filter; /* as much belief as the rows leave open */
-extern const struct nav_filter_ops nav_multi_filter;    /* several Gaussians with weights */
 
 #pragma GCC visibility pop
 #ifdef __cplusplus

@@ -1,6 +1,5 @@
 /* Monte-Carlo localisation: systematic resampling, a fixed or KLD-adapted number of particles, and recovery by
- * injection; and `multi`, which draws each mode anew from a Gaussian when it resamples (the Gaussian sum particle
- * filter of Kotecha and Djuric): the belief is a mixture of Gaussians, and fewer particles do.
+ * injection.
  *
  * Injection follows Thrun, Burgard and Fox (augmented MCL): the share of fresh particles is how far a fast average of
  * the mean weight lies below a slow one. Both take the weights before they are normalised (afterwards their mean is 1/N
@@ -24,7 +23,6 @@ static const double PENDING_MOST_M = 0.05, PENDING_MOST_RAD = 0.2;
 
 struct particle {
     const struct nav_problem *problem;
-    bool mixture; /* of Gaussians */
     struct nav_likelihood *likelihood;
     struct nav_particles cloud;
     struct nav_bins bins;
@@ -51,20 +49,20 @@ static void particle_summarise(struct particle *f)
     f->summary = nav_particles_summary(&f->cloud, &f->bins, f->summary.belief.mean);
 }
 
-static void *particle_create_as(const struct nav_problem *problem, bool mixture)
+static void *particle_create(const struct nav_problem *problem)
 {
     const struct nav_settings *s = &problem->settings;
     struct particle *f = calloc(1, sizeof *f);
     if (!f)
         return NULL;
-    *f = (struct particle){.problem = problem, .mixture = mixture, .slow = -1.0, .fast = -1.0};
-    double least = mixture ? s->multi.least : s->particle.least, most = mixture ? s->multi.most : s->particle.most;
-    if (!mixture && s->particle.count > 0.0)
+    *f = (struct particle){.problem = problem, .slow = -1.0, .fast = -1.0};
+    double least = s->particle.least, most = s->particle.most;
+    if (s->particle.count > 0.0)
         least = most = fmax(s->particle.count, 2.0);
     f->sample = (struct nav_sample){s->particle.error, (long)fmin(least, most), (long)most};
     nav_rng_seed(&f->rng, problem->seed, 0);
     f->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, 0.0);
-    if (!f->likelihood || nav_particles_init(&f->cloud, f->sample.most, mixture, 0.0) ||
+    if (!f->likelihood || nav_particles_init(&f->cloud, f->sample.most, false, 0.0) ||
         nav_bins_init(&f->bins, f->sample.most, s->particle.bin_m, s->particle.bin_deg * NAV_PI / 180.0)) {
         particle_destroy(f);
         return NULL;
@@ -73,16 +71,6 @@ static void *particle_create_as(const struct nav_problem *problem, bool mixture)
     f->summary.belief.mean = nav_particles_pose(&f->cloud, 0);
     particle_summarise(f);
     return f;
-}
-
-static void *particle_create(const struct nav_problem *problem)
-{
-    return particle_create_as(problem, false);
-}
-
-static void *particle_create_multi(const struct nav_problem *problem)
-{
-    return particle_create_as(problem, true);
 }
 
 static void particle_catch_up(struct particle *f)
@@ -135,57 +123,11 @@ static struct nav_pose particle_draw_fresh(struct particle *f)
     return pose;
 }
 
-/* Mean and covariance of a mode's particles, which weigh the same. */
-static struct nav_gaussian particle_fit(const struct nav_particles *p, const struct nav_mode *mode, int number)
-{
-    struct nav_gaussian g = {.mean = mode->mean};
-    double n = 0.0, sum[3] = {0.0};
-    for (long i = 0; i < p->count; i++) {
-        if ((int)p->mode[i] != number)
-            continue;
-        struct nav_pose at = nav_particles_pose(p, i);
-        const double d[3] = {at.x - mode->mean.x, at.y - mode->mean.y, nav_wrap(at.theta - mode->mean.theta)};
-        n += 1.0;
-        for (int k = 0; k < 9; k++)
-            g.covariance[k] += d[k / 3] * d[k % 3];
-        for (int k = 0; k < 3; k++)
-            sum[k] += d[k];
-    }
-    for (int k = 0; k < 9; k++)
-        g.covariance[k] = g.covariance[k] / n - sum[k / 3] * sum[k % 3] / (n * n);
-    g.mean = (struct nav_pose){g.mean.x + sum[0] / n, g.mean.y + sum[1] / n, nav_wrap(g.mean.theta + sum[2] / n)};
-    return g;
-}
-
-/* Draws the particles of each mode anew from its Gaussian; who would stand where the robot cannot stays. More modes
- * than can be distinguished are not modes yet. */
-static void particle_redraw(struct nav_particles *p, const struct nav_likelihood *l, struct nav_rng *rng)
-{
-    struct nav_mode mode[NAV_MODES_MOST];
-    int modes = nav_particles_modes(p, mode);
-    for (int m = 0; m < modes && modes < NAV_MODES_MOST; m++) {
-        struct nav_gaussian g = particle_fit(p, &mode[m], m);
-        double root[9];
-        nav_gaussian_root(g.covariance, root);
-        for (long i = 0; i < p->count; i++) {
-            if ((int)p->mode[i] != m)
-                continue;
-            const double z[3] = {nav_rng_rough(rng), nav_rng_rough(rng), nav_rng_rough(rng)};
-            struct nav_pose to = {g.mean.x + root[0] * z[0], g.mean.y + root[3] * z[0] + root[4] * z[1],
-                                  g.mean.theta + root[6] * z[0] + root[7] * z[1] + root[8] * z[2]};
-            if (nav_likelihood_clear(l, to.x, to.y, 0.0))
-                nav_particles_set(p, i, to);
-        }
-    }
-}
-
 static void particle_resample(struct particle *f, double fresh)
 {
     nav_bins_fill(&f->bins, &f->cloud);
     long count = nav_bins_needed(&f->bins, &f->sample, fresh);
     nav_particles_resample(&f->cloud, count, nav_rng_uniform(&f->rng));
-    if (f->mixture)
-        particle_redraw(&f->cloud, f->likelihood, &f->rng);
     /* Every k-th particle gives way, so that what is drawn in order of the old cloud loses the same share throughout.
      */
     double step = fresh > 0.0 ? 1.0 / fresh : INFINITY;
@@ -232,9 +174,10 @@ static long particle_components(const void *self, struct nav_component *out, lon
     return nav_particles_components(&f->cloud, f->summary.belief.mean, &f->pending, 1.0, out, room);
 }
 
-#define PARTICLE_OPS                                                                                                   \
-    .destroy = particle_destroy, .predict = particle_predict, .update = particle_update,                               \
-    .estimate = particle_estimate, .components = particle_components
-
-const struct nav_filter_ops nav_particle_filter = {.name = "particle", .create = particle_create, PARTICLE_OPS};
-const struct nav_filter_ops nav_multi_filter = {.name = "multi", .create = particle_create_multi, PARTICLE_OPS};
+const struct nav_filter_ops nav_particle_filter = {.name = "particle",
+                                                   .create = particle_create,
+                                                   .destroy = particle_destroy,
+                                                   .predict = particle_predict,
+                                                   .update = particle_update,
+                                                   .estimate = particle_estimate,
+                                                   .components = particle_components};

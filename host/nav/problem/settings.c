@@ -66,8 +66,6 @@ static const struct entry ENTRIES[] = {
     ENTRY(adaptive, hazard, 0.0001, 1e-12, 0.1),
     ENTRY(adaptive, wake, 0.001, 1e-12, 0.4),
     ENTRY(adaptive, scattered, 0.01, 0.0, 1.0),
-    ENTRY(multi, least, 100.0, 2.0, 1e6),
-    ENTRY(multi, most, 6000.0, 2.0, 1e6),
 };
 
 #define COUNT ((int)(sizeof ENTRIES / sizeof ENTRIES[0]))

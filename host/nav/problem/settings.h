@@ -90,11 +90,6 @@ struct nav_adaptive_settings {
     double scattered;     /* share of the histogram that a cloud may leave out */
 };
 
-struct nav_multi_settings {
-    double least; /* fewest particles; else as `particle` */
-    double most;  /* most particles */
-};
-
 struct nav_settings {
     struct nav_texture_settings texture;
     struct nav_radial_settings radial;
@@ -106,7 +101,6 @@ struct nav_settings {
     struct nav_foveal_settings foveal;
     struct nav_particle_settings particle;
     struct nav_adaptive_settings adaptive;
-    struct nav_multi_settings multi;
 };
 
 /* The defaults. */

@@ -84,14 +84,11 @@ static void filters_of_many_places_hold_both_and_the_rest_of_the_arena(void **st
 {
     (void)state;
     const struct nav_component apart[] = {{{0.2, 0.2, 0.0}, 0.02, 0.1, 0.7}, {{0.7, 0.8, 2.0}, 0.02, 0.1, 0.3}};
-    /* Shares of a few hundred particles, or of a hundred: give or take three deviations of such a count. */
+    /* Of a few hundred particles: give or take three deviations of such a count. */
     const struct {
         const char *name;
         double share, rest;
-    } many[] = {{"grid", 0.03, 0.004},
-                {"particle", 0.03, 3.0 * sqrt(NAV_ANYWHERE / 300.0)},
-                {"multi", 3.0 * sqrt(0.7 * 0.3 / 100.0), 3.0 * sqrt(NAV_ANYWHERE / 100.0)},
-                {"adaptive", 0.03, 0.004}};
+    } many[] = {{"grid", 0.03, 0.004}, {"particle", 0.03, 3.0 * sqrt(NAV_ANYWHERE / 300.0)}, {"adaptive", 0.03, 0.004}};
     struct nav_problem p = begun_from(apart, 2);
     for (size_t n = 0; n < sizeof many / sizeof many[0]; n++) {
         struct nav_filter *f = nav_filter_new(many[n].name, &p);
