@@ -2,10 +2,8 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
-enum { RASTER_MOST = 1024, BIN_HEADINGS = 12 };
-static const double BIN_M = 0.25;
+enum { RASTER_MOST = 1024 };
 static const double SHARE = 0.9;
 static const double MASS_LEAST = 1e-7; /* lighter components do not stretch the raster */
 
@@ -147,32 +145,4 @@ int nav_belief_region(const struct nav_component *c, long n, double x, double y,
     out->area_m2 = belief_area(&r, total);
     free(r.mass);
     return 0;
-}
-
-static double belief_heading_share(const struct nav_component *c, int k)
-{
-    double width = 2.0 * NAV_PI / BIN_HEADINGS, off = nav_wrap(c->pose.theta - (k + 0.5) * width), sum = 0.0;
-    if (c->sigma_rad * sqrt(3.0) >= NAV_PI)
-        return 1.0 / BIN_HEADINGS;
-    for (int turn = -1; turn <= 1; turn++)
-        sum += belief_overlap(belief_slab(off + 2.0 * NAV_PI * turn, c->sigma_rad), -width / 2.0, width / 2.0);
-    return sum;
-}
-
-long nav_belief_bins(const struct nav_component *c, long n, double size_x, double size_y, double *bins, long room)
-{
-    int nx = (int)fmax(ceil(size_x / BIN_M - 1e-9), 1.0), ny = (int)fmax(ceil(size_y / BIN_M - 1e-9), 1.0);
-    long count = (long)nx * ny * BIN_HEADINGS;
-    if (count > room)
-        return count;
-    memset(bins, 0, (size_t)count * sizeof *bins);
-    for (long i = 0; i < n * BIN_HEADINGS; i++) {
-        const struct nav_component *one = &c[i / BIN_HEADINGS];
-        int k = (int)(i % BIN_HEADINGS);
-        struct raster slice = {0.0, 0.0, BIN_M, nx, ny, bins + (size_t)k * (size_t)nx * (size_t)ny};
-        double mass = one->mass > 0.0 ? one->mass * belief_heading_share(one, k) : 0.0;
-        if (mass > 0.0)
-            belief_draw(&slice, one, mass);
-    }
-    return count;
 }

@@ -1,4 +1,4 @@
-/* Judging beliefs, given as components (nav_filter_components): regions of highest density, and coarse bins.
+/* Judging beliefs, given as components (nav_filter_components): regions of highest density.
  *
  * A component is drawn as a square of even density with the component's standard deviation, so that the cells of a grid
  * tile the floor: components of one belief should overlap, sigma at least their spacing / sqrt(12). Allocates; not for
@@ -22,10 +22,6 @@ struct nav_region {
 /* Region figures of n components at the point (x, y), m, which lies in the 90 % region if its level is at most 0.9; its
  * own bin counts half. -1: no memory or no mass, and a level of 1. */
 int nav_belief_region(const struct nav_component *, long n, double x, double y, struct nav_region *);
-
-/* Mass in bins of 25 cm x 25 cm x 30 degrees, [heading][y][x], x quickest; what lies outside 0 .. size goes to the
- * outermost bins. Returns the number of bins; fills them if `room` suffices. */
-long nav_belief_bins(const struct nav_component *, long n, double size_x, double size_y, double *bins, long room);
 /* cffi: end */
 
 #pragma GCC visibility pop

@@ -133,14 +133,6 @@ bool nav_likelihood_clear(const struct nav_likelihood *l, double x, double y, do
     return nav_obstacles_clear(&l->obstacles, x, y, fmax(l->robot->body_radius - grace, 0.0));
 }
 
-float nav_likelihood_of(const struct nav_likelihood *l, const uint8_t *codes)
-{
-    float sum = 0.0f;
-    for (int w = 0; w < l->whiskers; w++)
-        sum += l->table[w][codes[w]];
-    return sum;
-}
-
 float nav_likelihood_at(const struct nav_likelihood *l, const struct nav_place *at, uint8_t *codes)
 {
     float sum = 0.0f;

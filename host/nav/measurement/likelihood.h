@@ -27,12 +27,8 @@ void nav_likelihood_expect(const struct nav_likelihood *, const struct nav_place
 /* Whether the robot can stand at (x, y), its body taken `grace` m smaller. */
 bool nav_likelihood_clear(const struct nav_likelihood *, double x, double y, double grace);
 
-/* Log-likelihood of the row last read: sum over sensors (conditionally independent given the pose, as in the paper).
- */
-float nav_likelihood_of(const struct nav_likelihood *, const uint8_t *codes);
-
-/* Log-likelihood of the row last read at a place, and codes[whiskers] that it expects, 0 for kinds that were not read.
- */
+/* Log-likelihood of the row last read at a place: the sum over sensors (conditionally independent given the pose, as in
+ * the paper); and codes[whiskers] that it expects, 0 for kinds that were not read. */
 float nav_likelihood_at(const struct nav_likelihood *, const struct nav_place *, uint8_t *codes);
 
 /* Gives the same log-likelihood, but -INFINITY where the robot cannot stand. */

@@ -10,6 +10,7 @@
 #define NAV_TESTS_ROOMS_H
 
 #include "filter.h"
+#include "likelihood.h"
 
 static const uint8_t ROOM_FLOOR[] = {0, 1, 1, 0};
 static const struct nav_box ROOM_BOX[] = {{0.8, 0.0, 1.0, 0.3}};
@@ -39,6 +40,15 @@ static inline struct nav_problem room(void)
     };
     nav_settings_default(&p.settings);
     return p;
+}
+
+/* Log-likelihood of the row last read where sensors should meet these codes, sensor by sensor. */
+static inline float summed(const struct nav_likelihood *l, const uint8_t *codes)
+{
+    float sum = 0.0f;
+    for (int w = 0; w < l->whiskers; w++)
+        sum += l->table[w][codes[w]];
+    return sum;
 }
 
 #endif

@@ -3,7 +3,6 @@
 #include "near.h"
 #include "rooms.h"
 #include "wander.h"
-#include "weigh.h"
 
 /* Followed, carried off, lost and found: every state that a filter has. */
 static void run(struct nav_filter *f, struct wander *w)
@@ -51,22 +50,13 @@ static bool made_filter(const char *name, const struct nav_problem *problem)
     return f;
 }
 
-static bool made_weigher(const char *name, const struct nav_problem *problem)
-{
-    (void)name;
-    struct nav_weigher *w = nav_weigher_new(problem, 0.0);
-    nav_weigher_free(w);
-    return w;
-}
-
-static void starve(bool (*made)(const char *, const struct nav_problem *), const char *name,
-                   const struct nav_problem *problem)
+static void starve(const char *name, const struct nav_problem *problem)
 {
     bool whole = false;
     for (long fails = 1; !whole; fails++) {
         allocations = blocks = 0;
         failed_allocation = fails;
-        whole = made(name, problem);
+        whole = made_filter(name, problem);
         failed_allocation = 0;
         assert_int_equal(whole, allocations < fails);
         assert_int_equal(blocks, 0);
@@ -81,8 +71,7 @@ static void what_gets_no_memory_is_not_made_and_leaves_nothing_behind(void **sta
     struct nav_problem p = room();
     p.prior = (struct nav_prior){.component = components, .components = 2};
     for (int n = 0; nav_filter_name(n); n++)
-        starve(made_filter, nav_filter_name(n), &p);
-    starve(made_weigher, NULL, &p);
+        starve(nav_filter_name(n), &p);
 }
 
 /* What there is none of (whiskers, boxes, free places) is no lack of memory. */
@@ -97,7 +86,6 @@ static void a_problem_without_whiskers_boxes_or_free_places_is_taken(void **stat
         p.robot.tips = p.robot.rays = kind == 1 ? 0 : 1;
         for (int n = 0; nav_filter_name(n); n++)
             assert_true(made_filter(nav_filter_name(n), &p));
-        assert_true(made_weigher(NULL, &p));
     }
 }
 

@@ -110,40 +110,6 @@ static void a_point_mass_and_no_mass(void **state)
     assert_near(r.level, 1.0, 0.0);
 }
 
-static double sum(const double *v, long n)
-{
-    double total = 0.0;
-    for (long i = 0; i < n; i++)
-        total += v[i];
-    return total;
-}
-
-static void bins_share_a_component_by_overlap(void **state)
-{
-    (void)state;
-    double bins[4 * 2 * 12];
-    double half_width = 0.1 / sqrt(3.0), half_turn = (PI / 12.0) / sqrt(3.0);
-    /* x: 0.2 wide about 0.25; y: within the lower bin; heading: 30 degrees about 0 */
-    struct nav_component c = {{0.25, 0.1, 0.0}, half_width, half_turn, 1.0};
-    assert_int_equal(nav_belief_bins(&c, 1, 1.0, 0.5, bins, 96), 96);
-    assert_near(sum(bins, 96), 1.0, 1e-12);
-    assert_near(bins[0], 0.25, 1e-12);
-    assert_near(bins[1], 0.25, 1e-12);
-    assert_near(bins[11 * 8], 0.25, 1e-12);
-    assert_int_equal(nav_belief_bins(&c, 1, 1.0, 0.5, NULL, 0), 96);
-}
-
-static void bins_keep_what_is_outside_and_all_headings(void **state)
-{
-    (void)state;
-    double bins[4 * 2 * 12];
-    struct nav_component c[] = {{{-3.0, 9.0, 0.0}, 0.0, 100.0, 1.0}, {{0.9, 0.4, -0.1}, 0.0, 0.0, 2.0}};
-    assert_int_equal(nav_belief_bins(c, 2, 1.0, 0.5, bins, 96), 96);
-    assert_near(sum(bins, 96), 3.0, 1e-12);
-    assert_near(bins[5 * 8 + 4], 1.0 / 12.0, 1e-12);
-    assert_near(bins[11 * 8 + 7], 2.0, 1e-12);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -152,8 +118,6 @@ int main(void)
         cmocka_unit_test(components_of_a_gaussian_are_as_wide_as_they_lie_apart),
         cmocka_unit_test(a_region_may_have_two_parts),
         cmocka_unit_test(a_point_mass_and_no_mass),
-        cmocka_unit_test(bins_share_a_component_by_overlap),
-        cmocka_unit_test(bins_keep_what_is_outside_and_all_headings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

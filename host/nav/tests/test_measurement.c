@@ -142,18 +142,18 @@ static void whiskers_add_and_those_not_read_say_nothing(void **state)
     assert_int_equal(codes[0], 0);
     assert_int_equal(codes[1], (int)floor(0.0997 / l->model[1].step));
     nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = both});
-    float all = nav_likelihood_of(l, codes);
+    float all = summed(l, codes);
     nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = one});
-    float texture_only = nav_likelihood_of(l, codes);
+    float texture_only = summed(l, codes);
     double ratio[256];
     l->model[1].kind->fill(&l->model[1], &distance, ratio);
     double trust = l->trust[1].working, radial = log(trust * ratio[codes[1]] + 1.0 - trust);
     assert_near((double)all, (double)texture_only + radial, 1e-5);
     const double half[] = {0.0, 0.5};
     nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = half});
-    assert_near((double)nav_likelihood_of(l, codes), 0.5 * radial, 1e-5);
+    assert_near((double)summed(l, codes), 0.5 * radial, 1e-5);
     nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = none});
-    assert_near((double)nav_likelihood_of(l, codes), 0.0, 0.0);
+    assert_near((double)summed(l, codes), 0.0, 0.0);
     nav_likelihood_free(l);
 }
 
@@ -214,9 +214,9 @@ static void assert_values(const struct nav_expected *e, const struct nav_likelih
     size_t width = (size_t)e->whiskers + 1;
     double best = -INFINITY;
     for (uint32_t n = 1; n < e->signatures; n++)
-        best = fmax(best, (double)nav_likelihood_of(l, e->codes + width * n));
+        best = fmax(best, (double)summed(l, e->codes + width * n));
     for (uint32_t n = 1; n < e->signatures; n++)
-        assert_near((double)e->value[n], exp((double)nav_likelihood_of(l, e->codes + width * n) - best), 1e-6);
+        assert_near((double)e->value[n], exp((double)summed(l, e->codes + width * n) - best), 1e-6);
 }
 
 static void a_signature_is_worked_out_once_relative_to_the_best(void **state)

@@ -49,7 +49,6 @@ HEADERS = {
             "filter/filter.h",
             "belief/belief.h",
             "filter/replay.h",
-            "filter/weigh.h",
             "mapping/mapper.h",
             "planning/coverage.h",
         )

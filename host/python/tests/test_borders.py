@@ -21,7 +21,6 @@ from crunchbot.bridge.ring import FRAME, Writer
 from crunchbot.native import as_doubles, doubles, ffi, lib, octets
 from crunchbot.nav.filters import COMPONENT, Filter, Sensor, pack, prior_fault
 from crunchbot.nav.mapper import Mapper
-from crunchbot.nav.weigher import Weigher
 from crunchbot.planning.coverage import CoveragePlanner, Field, Vehicle
 from crunchbot.touch.contact import Contact
 from crunchbot.touch.contact_filter import ContactFilter
@@ -40,7 +39,6 @@ HELPERS = {"doubles", "floats", "octets", "pointer"}
 AROUND = {"cast", "from_buffer", "ctypes"}  # ways around the helpers
 # Functions that hand over only arrays of their own making.
 OWN = {
-    "nav.filters.Filter.bins",
     "nav.filters.problem_of",
     "nav.mapper.Mapper._grid",
     "nav.mapper.Mapper._listed",
@@ -114,12 +112,6 @@ CASES = {
         {"codes": (), "edges": (0,), "likelihood": (0, 1)},
     ),
     "nav.filters._components": of_one(lambda components: prior_fault(SCENE, components), "components", COMPONENTS),
-    "nav.weigher.Weigher.take": Case(
-        lambda **row: Weigher(SCENE).take(dataclasses.replace(OBSERVATIONS, **{n: a[None] for n, a in row.items()}), 0),
-        ROW,
-        {"odometry": (0,), "texture": (0, 1), "radial_m": (0,)},
-    ),
-    "nav.weigher.Weigher.weigh": of_one(Weigher(SCENE).weigh, "poses", np.zeros((4, 3)), 1),
     "planning.coverage.CoveragePlanner.plan": Case(
         lambda **cells: CoveragePlanner(VEHICLE, np.zeros(1)).plan(Field(0.1, 0.0, 0.0, **cells), np.ones(3)),
         {"open": np.ones((5, 6), np.float32), "fresh": np.ones((5, 6), np.uint8)},
@@ -269,9 +261,6 @@ def test_rows_outside_those_given_are_refused():
     for first, count in ((-1, 1), (0, ROWS + 1), (ROWS, 1), (ROWS + 1, 0), (3, -1), (2**62, 2**62)):
         with pytest.raises(ValueError, match="rows given"):
             made.replay(OBSERVATIONS, first, count)
-    for row in (-1, ROWS):
-        with pytest.raises(ValueError, match="rows given"):
-            Weigher(SCENE).take(OBSERVATIONS, row)
     assert len(made.replay(OBSERVATIONS, ROWS, 0)[0]) == 0
 
 

@@ -32,6 +32,7 @@ ROOT = Path(__file__).resolve().parents[3]
 CACHE = store.kept("nav_peers")
 PEERS = Path(__file__).resolve().parent / "peers"
 VENV, NATIVE = ROOT / "build/bench/peers-venv", ROOT / "build/bench/peers"
+WEIGH = NATIVE / "libweigh.so"
 APT = "apt-get install libmrpt-slam-dev"
 FAMILIES = ("anchor", "anchor+global", "anchor+kidnap")
 SEEDS, PYTHON_SEEDS = 100, 20  # packages in Python take seconds a run
@@ -92,7 +93,7 @@ def program(command: list, folder: Path, scene: Path, seed: int) -> Steps:
     """A peer's own process; one thread, as everybody has."""
     out = folder / "est.csv"
     alone = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
-    environment = os.environ | alone | {"PYTHONPATH": str(Path(crunchbot.__file__).parents[1])}
+    environment = os.environ | alone | {"PYTHONPATH": str(Path(crunchbot.__file__).parents[1]), "NAV_WEIGH": str(WEIGH)}
     words = [str(word) for word in (*command[:-1], scene, out, *command[-1], "--seed", seed)]
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
     if done.returncode != 0:
@@ -118,8 +119,10 @@ def python(peer: str, *options) -> Callable:
     return run
 
 
-def python_entries(most: int) -> list[Entry]:
+def python_entries(build: Path, most: int) -> list[Entry]:
     """Installs the packages into a virtual environment of their own, once."""
+    if not built(build, WEIGH.name):
+        return []
     pip = (VENV / "bin/pip", "install", "--disable-pip-version-check", "--require-hashes")
     ready = VENV / "ready"
     if not ready.exists():
@@ -141,7 +144,9 @@ def built(build: Path, program: str) -> Path | None:
     library = next(iter(sorted(build.rglob("libwhisker-nav.a"))), None)
     cmake = ("cmake", "-S", PEERS, "-B", NATIVE, f"-DNAV_LIBRARY={library}")
     if error := store.failure(cmake, ("cmake", "--build", NATIVE)):
-        store.leave_out("MRPT, programs of one's own", f"{PEERS.relative_to(ROOT)} does not build: {error}")
+        store.leave_out(
+            "MRPT, Python packages, programs of one's own", f"{PEERS.relative_to(ROOT)} does not build: {error}"
+        )
         return None
     if not (NATIVE / program).exists():
         store.leave_out("MRPT", f"not installed; {APT}")
@@ -226,7 +231,7 @@ def run(build: Path, seeds: int = SEEDS) -> None:
         for key, settings in OURS.items()
         if key[0].split()[0] in known
     ]
-    entries += mrpt_entries(build, seeds) + python_entries(seeds) + guests(seeds)
+    entries += mrpt_entries(build, seeds) + python_entries(build, seeds) + guests(seeds)
     jobs = [(e, family, seed) for e in entries for family in FAMILIES for seed in range(e.seeds)]
     results = {}
     for entry, family, seed in tqdm(jobs, desc="nav_peers", unit="run"):

@@ -60,7 +60,7 @@ static double likelihood(const struct nav_problem *p, struct nav_likelihood *l, 
     if (!nav_arena_free(&p->arena, pose.x, pose.y, 0.0))
         return 0.0;
     nav_likelihood_expect(l, &(struct nav_place){pose.x, pose.y, cos(pose.theta), sin(pose.theta)}, codes);
-    return exp((double)nav_likelihood_of(l, codes));
+    return exp((double)summed(l, codes));
 }
 
 static void cell_of(int n, int at[3])

@@ -226,13 +226,6 @@ class Filter:
         lib.nav_belief_region(_components(components), len(components), x_m, y_m, out)
         return out.level, out.area_m2
 
-    def bins(self) -> np.ndarray:
-        """Belief mass in bins of 25 cm x 25 cm x 30 degrees, flat."""
-        components, size = _components(held := self.components()), self.scene.arena.size_m
-        out = np.zeros(lib.nav_belief_bins(components, 0, *size, ffi.NULL, 0))
-        lib.nav_belief_bins(components, len(held), *size, doubles(out, "bins", (len(out),)), len(out))
-        return out
-
     @property
     def resolution(self) -> tuple[float, float, float, float] | None:
         """Edge of a cell in m, its extent in rad, the edge in m that the scene's detail asks for, and that of the cells in

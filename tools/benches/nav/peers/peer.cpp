@@ -147,7 +147,7 @@ double option(const Options &options, const std::string &name, double standard)
     return std::strtod(option(options, name, std::to_string(standard)).c_str(), nullptr);
 }
 
-Likelihood::Likelihood(const nav_problem &problem) : weigher_(nav_weigher_new(&problem, 0.0))
+Likelihood::Likelihood(const nav_problem &problem) : weigher_(nav_weigher_new(&problem))
 {
     if (!weigher_)
         throw std::bad_alloc();

@@ -10,9 +10,9 @@ import warnings
 from collections.abc import Iterator
 
 import numpy as np
+from weigher import Weigher
 
 from crunchbot.nav.observations import Observations, observations_path, read_observations
-from crunchbot.nav.weigher import Weigher
 from crunchbot.scene import Prior, Scene, load
 
 LEAST = -700.0  # log-likelihood where no robot can stand: packages differ in how they take infinities

@@ -13,13 +13,13 @@ struct nav_weigher {
     bool news;
 };
 
-struct nav_weigher *nav_weigher_new(const struct nav_problem *problem, double blur_m)
+struct nav_weigher *nav_weigher_new(const struct nav_problem *problem)
 {
     struct nav_weigher *w = calloc(1, sizeof *w);
     if (!w)
         return NULL;
     w->problem = problem;
-    w->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, blur_m);
+    w->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
     if (nav_intake_init(&w->intake, problem) || !w->likelihood) {
         nav_weigher_free(w);
         return NULL;
