@@ -22,6 +22,19 @@ static enum create_oi_mode commands_least_mode(uint8_t opcode)
     }
 }
 
+void create_power_up(sim_create *create)
+{
+    create->reader.count = 0;
+    create->stream = (struct create_stream){0};
+    create->line.count = create->line.frame = 0;
+    create->line.baud = create->model->baud;
+    create->line.change_at = 0;
+    create->encoder_mm = create->read_mm = create->distance_mm;
+    create->encoder_deg = create->read_deg = create->angle_deg;
+    create_set_mode(create, CREATE_OI_MODE_OFF);
+    create_renew(create);
+}
+
 static void commands_obey_mode(sim_create *create, uint8_t opcode)
 {
     switch (opcode) {

@@ -39,19 +39,6 @@ void sim_create_free(sim_create *create)
     free(create);
 }
 
-void create_power_up(sim_create *create)
-{
-    create->reader.count = 0;
-    create->stream = (struct create_stream){0};
-    create->line.count = create->line.frame = 0;
-    create->line.baud = create->model->baud;
-    create->line.change_at = 0;
-    create->encoder_mm = create->read_mm = create->distance_mm;
-    create->encoder_deg = create->read_deg = create->angle_deg;
-    create_set_mode(create, CREATE_OI_MODE_OFF);
-    create_renew(create);
-}
-
 void sim_create_receive(sim_create *create, const uint8_t *bytes, size_t count)
 {
     for (size_t i = 0; i < count; i++)

@@ -263,11 +263,6 @@ bool base_robot_stop(struct base_robot *robot, int64_t now_ms)
     return whisker_base_robot_order_speeds(robot, (struct create_speeds){0}, now_ms);
 }
 
-bool base_robot_kept(const struct base_robot *robot)
-{
-    return robot->port < 0 || robot->silent || robot->held != 0;
-}
-
 static void whisker_base_robot_log_hold(struct base_robot *robot, enum base_hold reason, bool on)
 {
     const bool heartbeat = reason == BASE_HOLD_HEARTBEAT;

@@ -1,4 +1,4 @@
-/* What the base says of itself, frame by frame: its mode and its battery. */
+/* What is known of the base: whether its wheels are kept stopped, and its mode and battery, frame by frame. */
 #include "daemon_log.h"
 #include "whisker_base_robot.h"
 
@@ -7,6 +7,11 @@
 /* A battery of 12 cells: below a tenth of its charge, or 1.0 V a cell, the base will not drive for long. */
 #define LOW_CHARGE 10
 #define LOW_MV 12000
+
+bool base_robot_kept(const struct base_robot *robot)
+{
+    return robot->port < 0 || robot->silent || robot->held != 0;
+}
 
 int32_t base_robot_mode_reported(const struct base_robot *robot)
 {
