@@ -109,7 +109,7 @@ format: setup ## format C, C++ and Python
 	@.venv/bin/clang-format -i $(SOURCES_C)
 	@.venv/bin/ruff format --quiet .
 
-lint: setup ## formats, Python lint, and the guards of tools/lint: arrows, circles, folders, names, words, pages
+lint: setup ## formats, Python lint, and the guards of tools/lint: arrows, budgets, circles, folders, names, words, pages
 	@.venv/bin/clang-format --dry-run --Werror $(SOURCES_C)
 	@.venv/bin/ruff format --quiet --check . || { echo "lint: Python is not formatted; run 'make format'" >&2; exit 1; }
 	@.venv/bin/ruff check --quiet .

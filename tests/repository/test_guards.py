@@ -8,9 +8,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
-from lint import arrows, circles, folders, functions, pages, words  # noqa: E402
+from lint import arrows, budget, circles, folders, functions, pages, words  # noqa: E402
 
-GUARDS = (arrows, circles, folders, functions, pages, words)
+GUARDS = (arrows, budget, circles, folders, functions, pages, words)
 PACKAGE = "host/python/crunchbot"
 
 
@@ -87,6 +87,113 @@ def test_circles_of_includes_and_imports_are_found(tmp_path):
 def test_an_internal_header_is_part_of_its_module(tmp_path):
     files = {"a/spi.h": "", "a/spi.c": '#include "spi_state.h"\n', "a/spi_state.h": '#include "spi.h"\n'}
     assert circles.complaints(repository(tmp_path, files)) == []
+
+
+BOARD = circles.INTERFACES[0]
+
+
+@pytest.mark.parametrize(
+    "back, found",
+    [
+        ("void a_one(void)\n{\n    b_two();\n}\n", True),
+        ("void a_one(void)\n{\n    later = b_two; /* b_two() */\n}\n", False),
+        ('void a_one(void)\n{\n    log("b_two()");\n}\n', False),
+        ("static void b_two(void)\n{\n}\n\nvoid a_one(void)\n{\n    b_two();\n}\n", False),
+    ],
+    ids=["call", "pointer", "text", "own function of that name"],
+)
+def test_circles_of_calls_are_found(tmp_path, back, found):
+    forth = "void b_two(void)\n{\n    a_one();\n}\n"
+    files = {"host/both.h": "void a_one(void);\nvoid b_two(void);\n", "host/a.c": back, "host/b.c": forth}
+    told = "circle of calls: host/a.c calls b_two() of host/b.c, host/b.c calls a_one() of host/a.c; "
+    expected = [told + "move what both need to a third file"] if found else []
+    assert circles.complaints(repository(tmp_path, files)) == expected
+
+
+def test_an_interface_is_no_circle_of_calls(tmp_path):
+    files = {
+        f"{BOARD}link.h": "void board_send(void);\n",
+        "firmware/core.c": "void core_tick(void)\n{\n    board_send();\n}\n",
+        "firmware/port.c": "void board_send(void)\n{\n    core_tick();\n}\n",
+    }
+    assert circles.complaints(repository(tmp_path, files)) == []
+
+
+def test_a_waiver_without_its_circle_is_found(tmp_path):
+    waived = sorted(next(iter(circles.WAIVED)))
+    (complaint,) = circles.complaints(repository(tmp_path, {waived[0]: "int x;\n"}))
+    assert waived[0] in complaint and complaint.endswith("take the waiver out")
+
+
+C_CONSTANTS = """static int variable = 7; /* #define NO 8 */
+#define ONE 1
+static const double TABLE[] = {0.5, 2, -3e-1};
+enum { FIVE = 5, SIX };
+"""
+PYTHON_CONSTANTS = """RATE_HZ = 2000
+PAIR: tuple = (1.5, "text", -2)
+lower = 3
+
+class Kind:
+    LEAST = 4
+    ON = True
+"""
+
+
+def budgeted(place, **rooms: tuple[int, int]):
+    """A repository with a file of C and one of Python, and budgets (lines, numbers) of its rooms."""
+    text = "".join(
+        f'"{room}" = {{ lines = {lines}, numbers = {numbers} }}\n' for room, (lines, numbers) in rooms.items()
+    )
+    files = {"c/room/a.c": C_CONSTANTS, "c/tests/test_a.c": C_CONSTANTS, "python/a.py": PYTHON_CONSTANTS}
+    return repository(place, {**files, budget.BUDGET: "# head\n\n" + text})
+
+
+def test_lines_and_numbers_of_rooms_are_counted(tmp_path):
+    place = budgeted(tmp_path, c=(4, 5), python=(7, 4))
+    assert budget.measured(place, budget.budgets((place / budget.BUDGET).read_text())) == {
+        "c": (4, 5),
+        "python": (7, 4),
+    }
+    assert budget.complaints(place) == []
+
+
+def test_a_room_above_its_budget_is_found(tmp_path):
+    place = budgeted(tmp_path, c=(3, 5), python=(7, 3))
+    remedy = f"at most ({budget.BUDGET}); take 1 out, or raise it and say why"
+    assert budget.complaints(place) == [f"c: 4 lines, 3 {remedy}", f"python: 4 numbers, 3 {remedy}"]
+
+
+def test_what_lies_in_no_room_is_found(tmp_path):
+    assert [line.split(",")[0] for line in budget.complaints(budgeted(tmp_path, c=(4, 5)))] == [
+        "what lies in no room: 7 lines",
+        "what lies in no room: 4 numbers",
+    ]
+
+
+def test_a_budget_is_lowered_and_never_raised(tmp_path):
+    place = budgeted(tmp_path, **{"c/room": (9, 4), "python": (7, 4), "gone": (5, 5)})
+    assert budget.lower(place) == ["c/room", "gone"]
+    text = (place / budget.BUDGET).read_text()
+    assert text == '# head\n\n"c/room" = { lines = 4, numbers = 4 }\n"python" = { lines = 7, numbers = 4 }\n'
+
+
+def test_a_commit_that_raises_a_budget_says_why(tmp_path):
+    place = budgeted(tmp_path, c=(4, 5), python=(7, 4))
+
+    def commit(*message: str) -> list[str]:
+        who = ["-c", "user.name=x", "-c", "user.email=x@x.example"]
+        words = [word for part in message for word in ("-m", part)]
+        subprocess.run(["git", "-C", place, *who, "commit", "-qa", *words], check=True)
+        return budget.complaints(place)
+
+    assert commit("first") == []
+    path = place / budget.BUDGET
+    path.write_text(path.read_text().replace("lines = 4", "lines = 9"))
+    (complaint,) = commit("more")
+    assert "raises the budget of c;" in complaint
+    path.write_text(path.read_text().replace("lines = 9", "lines = 10"))
+    assert commit("more still", "budget: a filter more") == []
 
 
 def test_a_crowded_folder_is_found(tmp_path):

@@ -1,12 +1,34 @@
-"""No circle between files: of what a C file includes (a source and its header are one module), and of what a Python module
-imports."""
+"""No circle between files: of what a C file includes (a source and its header are one module), of what it calls, and of what
+a Python module imports.
+
+A call is a name before a bracket that another file defines. Pointers to functions do not count, nor does an interface that a
+file implements for its callers (INTERFACES).
+"""
 
 import ast
 import re
 from pathlib import Path
 
+from .functions import DEFINITION, PRESCRIBED
 from .tree import ROOT, read, written
 
+# Headers of functions that a file below the caller implements: the firmware's port those of board/ for its core.
+INTERFACES = ("firmware/dspic/board/",)
+# Circles of calls that stay: files, and why.
+WAIVED = {
+    frozenset(
+        f"firmware/dspic/port_dspic/{name}.c" for name in ("port", "chip/main")
+    ): "the chip's vectors call the port, which jumps by it to the application; a simulated node has another jump",
+    frozenset(
+        f"host/nav/mapping/{name}.c" for name in ("mapper_run", "maps/kidnap")
+    ): "a map that begins anew takes the place of the one that found itself carried",
+    frozenset(
+        f"sim/dspic/{name}.c" for name in ("dma", "dspic", "events", "interrupts", "pins", "spi", "system", "timer")
+    ): "the blocks of a chip act on one another as its wires do: an event of SPI asks DMA for a word, which SPI gives",
+}
+OUTSIDE = re.compile(r"(^|/)tests?/|/test_|/tb/|fuzz|bench")  # test programs: what several define is not one function
+NOISE = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'', re.DOTALL)
+CALL = re.compile(r"\b([A-Za-z_]\w*)\(")
 INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
 PACKAGES = {"crunchbot": "host/python", "crunchbot_lab": "lab"}
 
@@ -74,6 +96,49 @@ def imports(root: Path) -> dict[str, set[str]]:
     return graph
 
 
+def _nearest(candidates: set[str], path: str) -> str | None:
+    """The one that shares most folders with the path; None where none does more than others."""
+    best = max((_common(one, path) for one in candidates), default=0)
+    near = [one for one in candidates if _common(one, path) == best]
+    return near[0] if len(near) == 1 else None
+
+
+def calls(root: Path) -> dict[str, dict[str, str]]:
+    """C file -> file that it calls a function of -> the first such function by name."""
+    text = {path: NOISE.sub(" ", read(path, root)) for path in written(root, {".c", ".h"}) if not OUTSIDE.search(path)}
+    implemented = {name for path in text if path.startswith(INTERFACES) for name in CALL.findall(text[path])}
+    defined: dict[str, set[str]] = {}  # function that others may call -> files
+    called: dict[str, set[str]] = {}
+    for path in (path for path in text if path.endswith(".c")):
+        found = list(DEFINITION.finditer(text[path]))
+        called[path] = set(CALL.findall(text[path])) - {match["name"] for match in found}
+        for name in (match["name"] for match in found if not re.search(r"\bstatic\b", match[0])):
+            if name not in implemented and not PRESCRIBED.match(name):
+                defined.setdefault(name, set()).add(path)
+    graph: dict[str, dict[str, str]] = {path: {} for path in called}
+    for path, names in called.items():
+        for name in sorted(names & defined.keys()):
+            if place := _nearest(defined[name], path):
+                graph[path].setdefault(place, name)
+    return graph
+
+
+def circles_of_calls(root: Path) -> list[str]:
+    graph = calls(root)
+    groups = circles({path: set(used) for path, used in graph.items()})
+    found = [
+        f"circle of calls: {', '.join(sorted(group))}: waived in {__name__}, and there is none; take the waiver out"
+        for group in WAIVED.keys() - set(map(frozenset, groups))
+        if group & graph.keys()
+    ]
+    for group in groups:
+        if frozenset(group) not in WAIVED:
+            each = [(path, next(other for other in group if other in graph[path])) for path in group]
+            named = ", ".join(f"{path} calls {graph[path][other]}() of {other}" for path, other in each)
+            found.append(f"circle of calls: {named}; move what both need to a third file")
+    return found
+
+
 def circles(graph: dict[str, set[str]]) -> list[list[str]]:
     """Groups of modules that reach one another (Tarjan's strongly connected components), without recursion."""
     index: dict[str, int] = {}
@@ -122,4 +187,4 @@ def complaints(root: Path = ROOT) -> list[str]:
         f"circle: {' <-> '.join(group)}; move what both need to a third file"
         for graph in (includes(root), imports(root))
         for group in circles(graph)
-    ]
+    ] + circles_of_calls(root)
