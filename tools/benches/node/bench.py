@@ -73,8 +73,9 @@ def load(build: Path) -> dict:
 
 def table(build: Path, program: str, name: str) -> list[dict]:
     """What a test program writes down of its cases, kept among the results."""
-    subprocess.run([build / "tests/node" / program, store.RESULTS / f"{name}.json"], check=True)
-    store.record_origin(name)
+    path = store.kept("node") / f"{name}.json"
+    subprocess.run([build / "tests/node" / program, path], check=True)
+    store.write_result(name, json.loads(path.read_text()))
     return store.read_result(name)
 
 
