@@ -22,7 +22,6 @@ cmd:umockdev-wrapper umockdev
 mod:libusb-1.0 libusb-1.0-0-dev
 mod:hidapi-libusb libhidapi-dev
 mod:umockdev-1.0 libumockdev-dev
-mod:libusbredirparser-0.5 libusbredirparser-dev
 mod:cmocka libcmocka-dev
 mod:libsystemd libsystemd-dev
 mod:libudev libudev-dev

@@ -98,13 +98,10 @@ bool set_level(void *options, const char *name, const char *text)
            command_line_refuse(PROGRAM, name, text, "give rtl, bytes or mixed");
 }
 
-template <Serve SERVE> bool set_port(void *options, const char *name, const char *text)
+bool set_usbip(void *options, const char *name, const char *text)
 {
     uint32_t port = 0;
-    if (of(options).serve != Serve::COMMAND) {
-        return command_line_refuse(PROGRAM, name, text, "give one of --usbip and --usbredir, once");
-    }
-    of(options).serve = SERVE;
+    of(options).usbip = true;
     const bool right = command_line_number(PROGRAM, name, text, 0, UINT16_MAX, &port);
     of(options).port = static_cast<uint16_t>(port);
     return right;
@@ -210,8 +207,7 @@ std::vector<command_option> all_options()
             set_level),
         own("rtl-seconds", "S", "level mixed: cycle by cycle for the first S simulated seconds (0)", set_rtl_seconds),
         own("usbip", "PORT", "serve the device by USB/IP on this port of 127.0.0.1 (0: a free one, which is\nprinted)",
-            set_port<Serve::USBIP>),
-        own("usbredir", "PORT", "serve it by usbredir, for QEMU's usb-redir", set_port<Serve::USBREDIR>),
+            set_usbip),
         own("unplugged", nullptr, "begin without the bridge, until 'plug' comes by the socket",
             set_flag<&Options::unplugged>),
         own("progress", nullptr, "a line 'progress TICK TICKS' every simulated second (default on a terminal)",
@@ -232,7 +228,7 @@ std::vector<command_option> all_options()
 
 const char USAGE[] =
     "usage: umockdev-wrapper whisker-bridge-sim --scene FLAT --seconds S [options] -- COMMAND...\n"
-    "       whisker-bridge-sim --scene FLAT --seconds S --usbip PORT | --usbredir PORT [options]\n"
+    "       whisker-bridge-sim --scene FLAT --seconds S --usbip PORT [options]\n"
     "       whisker-bridge-sim --bench --seconds S [options]\n"
     "\n"
     "Simulates robot, nodes and bridge (RTL) as a USB device that COMMAND, and only it, sees, or a Linux kernel. No\n"
@@ -254,19 +250,18 @@ void require(bool ok, const char *message)
 
 void check(const Options &options)
 {
-    const bool served = options.serve != Serve::COMMAND;
     require(options.seconds > 0, "--seconds is missing: say how long the run is, for example --seconds 10");
     require(options.link.sample_point <= options.link.sck_divider, "--sample-point is beyond --sck-divider: lower it");
     require(options.usb_faults.empty() || !options.faults.empty(), "--usb-faults needs --faults: give both or neither");
     if (options.bench) {
         require(options.command.empty(), "--bench runs no command: leave out what stands after --");
-        require(!served, "--bench has a host of its own: leave out --usbip and --usbredir");
+        require(!options.usbip, "--bench has a host of its own: leave out --usbip");
         return;
     }
     require(!options.scene.empty(), "--scene is missing: give a flat scene file, or --bench");
-    require(served || !options.command.empty(),
+    require(options.usbip || !options.command.empty(),
             "the command is missing: give it after --, for example -- whiskerd --ring demo");
-    require(!served || options.command.empty(),
+    require(!options.usbip || options.command.empty(),
             "a device that is served has no command here: leave out what stands after --");
     require(!options.unplugged || !options.socket.empty(), "--unplugged needs --socket: say where 'plug' comes from");
     require(options.create.on || options.create.link.empty(), "--create-link needs --create: say which model, 1 or 2");

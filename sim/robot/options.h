@@ -14,9 +14,6 @@ extern "C" {
 namespace bridge_sim
 {
 
-// Who gets the device: a command under umockdev, or the client that connects to a port.
-enum class Serve { COMMAND, USBIP, USBREDIR };
-
 constexpr char PROGRAM[] = "whisker-bridge-sim";
 
 // The Create: --create and the options of sim/create, each with "create-" before it.
@@ -30,6 +27,7 @@ struct Options {
     bool bench = false;
     bool progress = false;
     bool unplugged = false;
+    bool usbip = false; // the device is served by USB/IP, else a command under umockdev gets it
     std::string scene;
     std::string socket;
     std::string truth;
@@ -48,8 +46,7 @@ struct Options {
     size_t lanes_populated = 0; // 0: as many as the scene has whiskers
     BenchSettings link;         // SCK divider, word gap and sample point: bench only, else the host software sets them
     DefectKind defect = DefectKind::NONE;
-    Serve serve = Serve::COMMAND;
-    uint16_t port = 0; // of 127.0.0.1; 0: any that is free
+    uint16_t port = 0; // of USB/IP, on 127.0.0.1; 0: any that is free
     CreateOptions create;
     std::vector<std::string> command;
 

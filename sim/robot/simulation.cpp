@@ -21,7 +21,6 @@
 #include "rig.h"
 #include "usbfs_server.h"
 #include "usbip_server.h"
-#include "usbredir_server.h"
 extern "C" {
 #include "sim_world.h"
 }
@@ -47,10 +46,10 @@ size_t populated(const Options &options, const sim_scene &scene)
 }
 
 // A server says where it listens, for port 0 takes a free one.
-template <typename Server> std::unique_ptr<DevicePort> make_server(const char *protocol, uint16_t port)
+std::unique_ptr<DevicePort> make_server(uint16_t port)
 {
-    auto server = std::make_unique<Server>(port);
-    std::printf("serving %s at 127.0.0.1:%u\n", protocol, server->port());
+    auto server = std::make_unique<UsbipServer>(port);
+    std::printf("serving usbip at 127.0.0.1:%u\n", server->port());
     std::fflush(stdout);
     return server;
 }
@@ -104,14 +103,7 @@ std::optional<FaultPlan> plan_of(const Options &options, const sim_scene &scene)
 
 std::unique_ptr<DevicePort> port_of(const Options &options)
 {
-    switch (options.serve) {
-    case Serve::USBIP:
-        return make_server<UsbipServer>("usbip", options.port);
-    case Serve::USBREDIR:
-        return make_server<UsbredirServer>("usbredir", options.port);
-    default:
-        return std::make_unique<UsbfsServer>();
-    }
+    return options.usbip ? make_server(options.port) : std::make_unique<UsbfsServer>();
 }
 
 } // namespace
@@ -168,7 +160,7 @@ Simulation::~Simulation()
 
 int Simulation::run()
 {
-    if (options_.serve == Serve::COMMAND) {
+    if (!options_.usbip) {
         child_ = std::make_unique<Child>(options_.command);
     }
     while (!ended()) {

@@ -1,4 +1,4 @@
-// The whole simulated robot as a USB device beside a running command, or served by USB/IP or usbredir: decides when a
+// The whole simulated robot as a USB device beside a running command, or served by USB/IP: decides when a
 // tick may be produced, produces it, and serves USB and the socket in between. Simulated time leads; the machine's
 // speed changes nothing that is recorded.
 #pragma once

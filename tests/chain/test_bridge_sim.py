@@ -87,12 +87,12 @@ def test_faults_are_reported_to_the_simulation_in_the_order_they_strike(tmp_path
 
 
 @contextmanager
-def served(protocol: str):
-    """A connection to the device that bridge-sim serves so; at the end bridge-sim is stopped as a user stops it."""
-    words = command("bridge-sim", f"--{protocol}", 0)
+def served():
+    """A connection to the device that bridge-sim serves; at the end bridge-sim is stopped as a user stops it."""
+    words = command("bridge-sim", "--usbip", 0)
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         said = process.stdout.readline()
-        found = re.match(rf"the bridge is served by {protocol} on port (\d+) of this machine; try: ", said)
+        found = re.match(r"the bridge is served by usbip on port (\d+) of this machine; try: ", said)
         assert found, said + process.stderr.read()
         with socket.create_connection(("127.0.0.1", int(found[1])), END_S) as link:
             yield link
@@ -101,7 +101,7 @@ def served(protocol: str):
 
 
 def test_usbip_lists_the_bridge_of_the_verilog(build):
-    with served("usbip") as link:
+    with served() as link:
         link.sendall(bytes.fromhex("0111800500000000"))
         answer = link.makefile("rb").read(12 + 312 + 2 * 4)
     assert answer[:12] == bytes.fromhex("011100050000000000000001")
@@ -109,21 +109,6 @@ def test_usbip_lists_the_bridge_of_the_verilog(build):
     identity = LIMITS["usb_vendor_id"].to_bytes(2, "big") + LIMITS["usb_product_id"].to_bytes(2, "big")
     assert device[:12] == bytes.fromhex("000000010000000200000003") and device[12:16] == identity
     assert (answer[12 + 312], answer[12 + 312 + 4]) == (0xFF, 0x03)  # vendor's and HID's class
-
-
-def test_usbredir_says_hello_and_the_device_follows(build):
-    """Headers of 12 bytes until both ends have said that they can do more: type, length, id, little-endian."""
-    with served("usbredir") as link:
-        stream = link.makefile("rb")
-        kind, length = (int.from_bytes(stream.read(4), "little") for _ in range(2))
-        assert kind == 0 and length == 64 + 4
-        assert stream.read(4 + length)[4:].startswith(b"whisker-bridge-sim")
-        link.sendall(b"".join(n.to_bytes(4, "little") for n in (0, 64, 0)) + b"test".ljust(64, b"\0"))
-        kinds = []
-        for _ in range(3):
-            kinds.append(int.from_bytes(stream.read(4), "little"))
-            stream.read(4 + int.from_bytes(stream.read(4), "little"))
-    assert kinds == [5, 4, 1]  # endpoints, interfaces, device
 
 
 def test_wrong_use_is_one_line(capsys, build, tmp_path):
@@ -135,8 +120,6 @@ def test_wrong_use_is_one_line(capsys, build, tmp_path):
     )
     assert main(["bridge-sim", "--lanes", "29"]) == 2
     assert "'29' is not a whole number from 1 to 28" in capsys.readouterr().err
-    assert main(["bridge-sim", "--usbip", "--usbredir"]) == 2
-    assert "not allowed with argument" in capsys.readouterr().err
 
 
 def test_a_port_that_is_taken_is_one_line(build):

@@ -3,7 +3,6 @@
 import os
 import re
 import selectors
-import socket
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,13 +10,10 @@ from pathlib import Path
 
 from image import MissingError
 
-from crunchbot.programs import program
-from crunchbot_lab.simulation.bridge import flat_scene
 from whisker_protocol import LANES
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build/kernel"
-SECONDS = 86400  # simulated; the guest is done long before
 SILENCE_S = 900  # a guest that says nothing for so long hangs
 START_S = 120
 
@@ -83,24 +79,13 @@ class Device:
         self._log.close()
 
 
-def redirected(folder: Path) -> list[str]:
-    """Command of the bridge over usbredir, whose cable is pulled by its socket."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "scene.flat").write_text(flat_scene(None, 1)[0])
-    words = [program("whisker-bridge-sim"), "--scene", folder / "scene.flat", "--seconds", SECONDS]
-    words += ["--lanes-populated", LANES, "--socket", folder / "cable.sock", "--usbredir", 0]
-    return [str(word) for word in words]
+def shared() -> list[str]:
+    """Command of the bridge over USB/IP, as a user gives it."""
+    return [sys.executable, "-m", "crunchbot.cli", "bridge-sim", "--lanes", str(LANES), "--usbip", "0"]
 
 
-def pull_cable(folder: Path, word: str) -> None:
-    """Unplug or plug the bridge over usbredir."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as link:
-        link.connect(str(folder / "cable.sock"))
-        link.send(word.encode())
-
-
-def qemu(name: str, vmlinuz: Path, packed: Path, port: str, command_line: str = "") -> list[str]:
-    """A guest with an xHCI controller and the bridge on it; its console is a file, the lines go over a second port."""
+def qemu(name: str, vmlinuz: Path, packed: Path, command_line: str = "") -> list[str]:
+    """A guest with a network that ends at this machine; its console is a file, the lines go over a second port."""
     words = ["qemu-system-x86_64", "-accel", "tcg,thread=multi", "-cpu", "max", "-smp", "1", "-m", "1024"]
     words += ["-display", "none", "-no-reboot", "-nodefaults"]
     words += ["-kernel", str(vmlinuz), "-initrd", str(packed)]
@@ -108,8 +93,7 @@ def qemu(name: str, vmlinuz: Path, packed: Path, port: str, command_line: str = 
     words += ["-append", f"console=ttyS0 panic=-1 mitigations=off no_timer_check {command_line}".strip()]
     words += ["-serial", f"file:{OUT / f'{name}-console.log'}"]
     words += ["-chardev", "stdio,id=talk,signal=off", "-serial", "chardev:talk"]
-    words += ["-device", "qemu-xhci", "-chardev", f"socket,id=bridge,host=127.0.0.1,port={port}"]
-    return [*words, "-device", "usb-redir,chardev=bridge"]
+    return [*words, "-netdev", "user,id=net", "-device", "virtio-net-pci,netdev=net,romfile="]
 
 
 class Guest:

@@ -13,11 +13,22 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "protocol"))
-from guest_talk import PLUG_S, PROGRAM_S, CheckError, Checks, Talk, await_that, command, require  # noqa: E402
+from guest_talk import (  # noqa: E402
+    HOST,
+    PLUG_S,
+    PROGRAM_S,
+    CheckError,
+    Checks,
+    Talk,
+    attach,
+    await_that,
+    command,
+    detach,
+    require,
+)
 
 from whisker_protocol import FRAME_BYTES, LIMITS, REPORTS, WIRE_VERSION, decode_frame  # noqa: E402
 
-HOST = "10.0.2.2"  # the machine that runs the guest, in QEMU's user network
 LONG_RUN_FRAMES = 20000
 SHORT_RUN_FRAMES = 2000
 RING = "kernel"
@@ -292,10 +303,8 @@ def replug(checks: BridgeChecks) -> str:
     """The cable is pulled while whiskerd runs; it goes on when the bridge is back."""
 
     def pull_and_plug() -> None:
-        require(checks.talk.ask("unplug") == "done", "the host could not unplug")
-        await_state(False)
-        require(checks.talk.ask("plug") == "done", "the host could not plug")
-        await_state(True)
+        usbip_detach(checks)
+        usbip_attach(checks)
 
     with daemon(checks):
         return read_ring(checks, 2 * SHORT_RUN_FRAMES, 1, pull_and_plug) + ", unplugged and replugged once"
@@ -313,14 +322,14 @@ def usbip_attach(checks: BridgeChecks, which: str = "usbip") -> str:
     port = checks.talk.ask(which)
     listed = command("usbip", "--tcp-port", port, "list", "-r", HOST)
     require(IDENTITY in listed, f"not in the list: {listed}")
-    command("usbip", "--tcp-port", port, "attach", "-r", HOST, "-b", "1-1")
+    attach(port)
     await_state(True)
     return "listed and attached"
 
 
 def usbip_detach(_: Checks) -> str:
     """`usbip detach` unplugs it."""
-    command("usbip", "detach", "-p", "00")
+    detach()
     await_state(False)
     return "detached"
 
@@ -368,34 +377,19 @@ def free_daemon(checks: BridgeChecks) -> str:
 
 
 def main() -> None:
-    """All checks, first over usbredir, then over USB/IP."""
+    """All checks over USB/IP."""
     talk = Talk()
     checks = BridgeChecks(talk, Path(sys.argv[1]))
-    for check in (enumerates, lsusb, usbtest, libusb_stream, libusb_stall, libusb_halt, libusb_cancel, libusb_reset):
-        checks.run(f"usbredir {check.__name__}", check)
-    for check in (hidapi_hidraw, hidapi_libusb, pyusb, daemon_short, replug, daemon_long, no_complaint):
-        checks.run(f"usbredir {check.__name__}", check)
-    talk.ask("unplug")
-    await_state(False)
-    again = [
-        usbtest,
-        libusb_stream,
-        libusb_stall,
-        libusb_halt,
-        libusb_cancel,
-        libusb_reset,
-        hidapi_hidraw,
-        hidapi_libusb,
-        pyusb,
-    ]
-    for check in (usbip_attach, enumerates, lsusb, *again, daemon_short, usbip_detach):
-        checks.run(f"usbip {check.__name__.removeprefix('usbip_')}", check)
-    checks.run("usbip attach again", usbip_attach)
-    checks.run("usbip stream again", libusb_stream)
-    checks.run("usbip detach again", usbip_detach)
+    for check in (usbip_attach, enumerates, lsusb, usbtest, libusb_stream, libusb_stall, libusb_halt, libusb_cancel):
+        checks.run(check.__name__.removeprefix("usbip_"), check)
+    for check in (libusb_reset, hidapi_hidraw, hidapi_libusb, pyusb, daemon_short, replug, daemon_long, usbip_detach):
+        checks.run(check.__name__.removeprefix("usbip_"), check)
+    checks.run("attach again", usbip_attach)
+    checks.run("stream again", libusb_stream)
+    checks.run("detach again", usbip_detach)
     for check in (free_attach, enumerates, free_run, free_daemon):
         checks.run(f"free {check.__name__.removeprefix('free_')}", check)
-    checks.run("usbip no_complaint", no_complaint)
+    checks.run("no_complaint", no_complaint)
     for line in kernel_log():
         talk.say("log", line)
     talk.say("end")

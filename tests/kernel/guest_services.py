@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
 
-from guest_talk import Checks, Talk, await_that, command, require
+from guest_talk import Checks, Talk, attach, await_that, command, detach, require
 
 UNITS = Path("/usr/local/lib/systemd/system")
 DAEMON = "whiskerd.service"
@@ -149,7 +149,7 @@ def read_ring(uid: int = NOBODY) -> str:
 def plug_starts_daemon(checks: Checks) -> str:
     """udev starts whiskerd when the bridge is plugged in; it runs as its user, without capabilities."""
     require(show(DAEMON, "ActiveState") == "inactive", "whiskerd runs without a bridge")
-    require(checks.talk.ask("plug") == "done", "the host could not plug")
+    attach(checks.talk.ask("usbip"))
     await_active(DAEMON)
     status = Path(f"/proc/{show(DAEMON, 'MainPID')}/status").read_text()
     facts = dict(line.split(":\t", 1) for line in status.splitlines() if ":\t" in line)
@@ -232,8 +232,8 @@ def name_taken(_: Checks) -> str:
 
 def replug(checks: Checks) -> str:
     """Plugged in again, udev starts it again."""
-    require(checks.talk.ask("unplug") == "done", "the host could not unplug")
-    require(checks.talk.ask("plug") == "done", "the host could not plug")
+    detach()
+    attach(checks.talk.ask("usbip"))
     await_active(DAEMON)
     return read_ring()
 

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 PORT = "/dev/ttyS1"
+HOST = "10.0.2.2"  # the machine that runs the guest, in QEMU's user network
 PROGRAM_S = 600  # the guest is emulated, and may have half a processor
 PLUG_S = 300
 POLL_S = 0.05
@@ -71,6 +72,16 @@ def command(*words: str) -> str:
     text = (done.stderr or done.stdout).strip().splitlines()
     require(done.returncode == 0, f"{Path(words[0]).name}: exit code {done.returncode}: {' / '.join(text[-3:])}")
     return done.stdout
+
+
+def attach(port: str) -> None:
+    """Plug in the bridge that is served on a port of the host."""
+    command("usbip", "--tcp-port", port, "attach", "-r", HOST, "-b", "1-1")
+
+
+def detach() -> None:
+    """Pull it out."""
+    command("usbip", "detach", "-p", "00")
 
 
 def await_that(condition: Callable[[], object], what: str) -> None:

@@ -15,14 +15,12 @@ MODULES = (
     "virtio_net",
     "9pnet_virtio",
     "9p",
-    "xhci-pci",
-    "ehci-pci",
     "usbhid",
     "hid-generic",
     "vhci-hcd",
 )
 # polkitd: without it logind lets root alone delay the machine's sleep.
-ROOT_PACKAGES = ("systemd-sysv", "udev", "dbus", "polkitd", "python3", "libusb-1.0-0", "libhidapi-libusb0")
+ROOT_PACKAGES = ("systemd-sysv", "udev", "dbus", "polkitd", "python3", "libusb-1.0-0", "libhidapi-libusb0", "usbip")
 # What must be there: program (or file), Debian package.
 TOOLS = {
     "qemu-system-x86_64": "qemu-system-x86",

@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
 """A stock Linux kernel meets the simulated bridge, and systemd the services: `make test-kernel`.
 
-Boots Debian's kernel in QEMU (software emulation) twice. The first guest gets the Verilated bridge over usbredir and then
-over USB/IP, and runs lsusb, libusb, hidapi, pyusb and whiskerd (guest_checks.py). The second is a Debian with systemd in
-which the project is installed, with the bridge and two Creates (guest_services.py). One line per check, "ok NAME" or
-"FAILED NAME"; the last line is "N passed, N failed". Exit code 1 if anything failed, 2 if something is missing. Logs:
-build/kernel.
+Boots Debian's kernel in QEMU (software emulation) twice. The first guest gets the Verilated bridge over USB/IP, and
+runs lsusb, libusb, hidapi, pyusb and whiskerd (guest_checks.py). The second is a Debian with systemd in which the project
+is installed, with the bridge and two Creates (guest_services.py). One line per check, "ok NAME" or "FAILED NAME"; the
+last line is "N passed, N failed". Exit code 1 if anything failed, 2 if something is missing. Logs: build/kernel.
 """
 
 import argparse

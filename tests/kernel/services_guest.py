@@ -8,7 +8,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from guest import OUT, Device, Guest, Report, converse, pull_cable, qemu, redirected
+from guest import OUT, Device, Guest, Report, converse, qemu, shared
 from image import MissingError, debian, initramfs, kernel, load_order
 
 from crunchbot.programs import program
@@ -17,9 +17,10 @@ HERE = Path(__file__).resolve().parent
 NAME = "services"
 FOLDER = OUT / NAME
 LAYER = FOLDER / "layer"
-MODULES = ("virtio_pci", "virtio_blk", "squashfs", "overlay", "xhci-pci", "usbhid", "hid-generic", "ftdi_sio")
+MODULES = ("virtio_pci", "virtio_blk", "virtio_net", "squashfs", "overlay")
+MODULES += ("xhci-pci", "vhci-hcd", "usbhid", "hid-generic", "ftdi_sio")
 CREATES = ("create0", "create1")
-QUIET = "systemd.mask=serial-getty@ttyS0.service systemd.mask=getty@tty1.service systemd.firstboot=off"
+QUIET = "systemd.mask=serial-getty@ttyS0.service systemd.mask=getty@tty1.service systemd.firstboot=off net.ifnames=0"
 JOURNAL = "systemd.journald.forward_to_console=1 systemd.show_status=0"
 CHECKS_UNIT = """[Unit]
 Description=What the services do
@@ -48,11 +49,12 @@ def install(build: Path) -> None:
     (LAYER / "etc/machine-id").write_text(f"{1:032x}\n")  # otherwise a first start enables every unit
 
 
-def guest_words(vmlinuz: Path, packed: Path, port: str) -> list[str]:
+def guest_words(vmlinuz: Path, packed: Path) -> list[str]:
     """The guest beside its devices: Debian's files as a disk, two serial adapters, a monitor that pulls them."""
-    words = qemu(NAME, vmlinuz, packed, port, f"{QUIET} {JOURNAL}")
+    words = qemu(NAME, vmlinuz, packed, f"{QUIET} {JOURNAL}")
     words += ["-drive", f"file={FOLDER / 'debian.sqfs'},format=raw,if=virtio,readonly=on"]
     words += ["-chardev", f"socket,id=monitor,path={FOLDER / 'monitor.sock'},server=on,wait=off", "-mon", "monitor"]
+    words += ["-device", "qemu-xhci"]
     for name in CREATES:
         words += ["-chardev", f"serial,id={name},path={FOLDER / name}", "-device", adapter(name)]
     return words
@@ -73,12 +75,12 @@ def monitor(order: str) -> None:
             pass
 
 
-def obey(word: str) -> str:
-    """Do what the guest asks for: plug, unplug (the bridge), plug create1, unplug create1."""
+def obey(word: str, port: str) -> str:
+    """Do what the guest asks for: plug create1, unplug create1; or say where the bridge is served."""
     order, _, device = word.partition(" ")
-    if not device:
-        pull_cable(FOLDER, order)
-    elif order == "plug":
+    if order == "usbip":
+        return port
+    if order == "plug":
         monitor(f"device_add {adapter(device)}")
     else:
         monitor(f"device_del {device}-usb")
@@ -99,12 +101,11 @@ def run(report: Report) -> None:
     install(build)
     packed = initramfs(FOLDER, load_order(modules, MODULES), HERE / "services_init.sh", "")
     with ExitStack() as stack:
-        words = [*redirected(FOLDER), "--unplugged"]
-        bridge = stack.enter_context(Device("services-bridge", words, r"serving usbredir at \S+:(\d+)"))
+        bridge = stack.enter_context(Device("services-bridge", shared(), r"port (\d+)"))
         for name in CREATES:
             stack.enter_context(Device(name, create(name), r" at (\S+)"))
         began = time.monotonic()
-        guest = stack.enter_context(Guest(NAME, guest_words(vmlinuz, packed, bridge.place)))
+        guest = stack.enter_context(Guest(NAME, guest_words(vmlinuz, packed)))
         report.note(f"booting {vmlinuz.name} with systemd")
-        converse(NAME, guest, obey, report)
+        converse(NAME, guest, lambda word: obey(word, bridge.place), report)
         report.note(f"{NAME} guest ended after {time.monotonic() - began:.0f} s")

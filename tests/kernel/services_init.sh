@@ -6,6 +6,7 @@ mount -t proc proc /proc
 mount -t sysfs sys /sys
 mount -t devtmpfs dev /dev
 while read -r module; do insmod "/modules/$module" || echo "guest: module $module did not load"; done </modules/order
+ip link set eth0 up && ip addr add 10.0.2.15/24 dev eth0
 mkdir /debian /changes /root
 mount -t squashfs -o ro /dev/vda /debian
 mount -t tmpfs changes /changes

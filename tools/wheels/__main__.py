@@ -22,7 +22,7 @@ MACHINES = ("x86_64", "aarch64")
 SIMULATION = ROOT / "sim/wheel/crunchbot_sim"
 # Libraries that a system installs: a wheel must not carry its own.
 SYSTEM_LIBRARIES = [
-    *("libusb-1.0.so.0", "libhidapi-libusb.so.0", "libusbredirparser.so.1", "libumockdev.so.0", "libsystemd.so.0"),
+    *("libusb-1.0.so.0", "libhidapi-libusb.so.0", "libumockdev.so.0", "libsystemd.so.0"),
     *("libgobject-2.0.so.0", "libglib-2.0.so.0", "libudev.so.1"),
 ]
 

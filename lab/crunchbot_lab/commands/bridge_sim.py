@@ -1,6 +1,6 @@
 """`whisker bridge-sim`: the simulated bridge, so that everything can be tried without hardware.
 
-With whiskerd on it, or, by --usbip or --usbredir, as a USB device for a Linux kernel.
+With whiskerd on it, or, by --usbip, as a USB device for a Linux kernel.
 """
 
 import argparse
@@ -26,15 +26,8 @@ TICKS_PER_S = LIMITS["clock_hz"] // LIMITS["tick_period"]
 DAY_S = 86400.0
 UP_S = 60.0  # for the simulated bridge to enumerate
 USBIP_PORT = 3240  # registered for USB/IP
-USBREDIR_PORT = 4000  # QEMU's examples take it
 PORT_MAX = 65535
 LEVELS = ("rtl", "bytes")
-# What to do with the device, by the protocol that serves it.
-REMEDIES = {
-    "usbip": "sudo modprobe vhci-hcd; sudo usbip --tcp-port {port} attach -r 127.0.0.1 -b 1-1",
-    "usbredir": "qemu-system-x86_64 ... -device qemu-xhci -chardev socket,id=bridge,host=127.0.0.1,port={port} "
-    "-device usb-redir,chardev=bridge",
-}
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -57,14 +50,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pace", type=number_above(-1e-9), default=1.0, metavar="X", help=text)
     text = "how much of the bridge is simulated (%(default)s): the gateware, cycle by cycle, or only around requests and faults"
     parser.add_argument("--level", choices=LEVELS, default=LEVELS[0], help=text)
-    served = parser.add_mutually_exclusive_group()
     text = (
         "no whiskerd: give the device to a Linux kernel by USB/IP, on this port of 127.0.0.1 (%(const)s; 0: a free one)"
     )
     port = whole_number(0, PORT_MAX)
-    served.add_argument("--usbip", nargs="?", type=port, const=USBIP_PORT, metavar="PORT", help=text)
-    text = "the same by usbredir, for a guest in QEMU (%(const)s; 0: a free one)"
-    served.add_argument("--usbredir", nargs="?", type=port, const=USBREDIR_PORT, metavar="PORT", help=text)
+    parser.add_argument("--usbip", nargs="?", type=port, const=USBIP_PORT, metavar="PORT", help=text)
     parser.set_defaults(run=run)
 
 
@@ -72,16 +62,16 @@ def run(arguments: argparse.Namespace) -> int:
     stop = stop_on_signals()
     with tempfile.TemporaryDirectory(prefix="whisker-") as folder:
         command = _command(arguments, Path(folder))
-        pipes = {"stderr": subprocess.PIPE, "stdout": subprocess.PIPE if _protocol(arguments) else None}
+        pipes = {"stderr": subprocess.PIPE, "stdout": None if arguments.usbip is None else subprocess.PIPE}
         with subprocess.Popen(command, text=True, start_new_session=True, **pipes) as process:
             watcher = threading.Thread(target=_relay, args=(process,), daemon=True)
             watcher.start()
             course = Course(Path(folder) / "sim.sock", arguments.drive, arguments.pace, stop)
             course.start()
-            if _protocol(arguments):
-                _say_where(process)
-            else:
+            if arguments.usbip is None:
                 _await_ring(arguments.ring, process, stop)
+            else:
+                _say_where(process)
             while process.poll() is None and not stop.wait(0.1):
                 continue
             stopped = process.poll() is None
@@ -94,18 +84,12 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if stopped else process.returncode
 
 
-def _protocol(arguments) -> str | None:
-    """The protocol that serves the device; None: whiskerd has it."""
-    return next((name for name in REMEDIES if getattr(arguments, name) is not None), None)
-
-
 def _command(arguments, folder: Path) -> list[str]:
     """The simulation under umockdev with whiskerd inside, or as a server."""
     text, whiskers = flat_scene(arguments.scene, arguments.seed, arguments.mechanics)
     lanes = max(arguments.lanes or whiskers, whiskers)
     (folder / "scene.flat").write_text(text)
-    protocol = _protocol(arguments)
-    words = [] if protocol else [program("umockdev-wrapper")]
+    words = [program("umockdev-wrapper")] if arguments.usbip is None else []
     words += [program("whisker-bridge-sim"), "--scene", folder / "scene.flat"]
     words += ["--seconds", arguments.seconds, "--seed", arguments.seed, "--lanes-populated", lanes]
     words += ["--socket", folder / "sim.sock", "--followers", 1, "--level", arguments.level]
@@ -113,9 +97,10 @@ def _command(arguments, folder: Path) -> list[str]:
         (folder / "faults").write_text(read_faults(arguments.fault, TICKS_PER_S))
         words += ["--fault-list", folder / "faults"]
     mask = (1 << lanes) - 1
-    if protocol:
-        return [str(word) for word in [*words, f"--{protocol}", getattr(arguments, protocol)]]
-    words += ["--", program("whiskerd"), "--ring", arguments.ring, "--lane-mask", mask]
+    if arguments.usbip is None:
+        words += ["--", program("whiskerd"), "--ring", arguments.ring, "--lane-mask", mask]
+    else:
+        words += ["--usbip", arguments.usbip]
     return [str(word) for word in words]
 
 
@@ -135,10 +120,9 @@ def _await_ring(ring: str, process: subprocess.Popen, stop: threading.Event) -> 
 
 def _say_where(process: subprocess.Popen) -> None:
     """Where the device is served, and what to do with it; nothing when the simulation ended before."""
-    if found := re.match(r"serving (\w+) at \S+:(\d+)", process.stdout.readline()):
-        protocol, port = found.groups()
-        print(f"the bridge is served by {protocol} on port {port} of this machine; try: ", end="")
-        print(REMEDIES[protocol].format(port=port), flush=True)
+    if found := re.match(r"serving usbip at \S+:(\d+)", process.stdout.readline()):
+        remedy = f"sudo modprobe vhci-hcd; sudo usbip --tcp-port {found[1]} attach -r 127.0.0.1 -b 1-1"
+        print(f"the bridge is served by usbip on port {found[1]} of this machine; try: {remedy}", flush=True)
 
 
 def _relay(process: subprocess.Popen) -> None:

@@ -1,5 +1,5 @@
-// The transfers of one client of a server: which are in the model, and which of them a result belongs to. The client
-// names them as its protocol does; the model knows them by ids that no two clients share.
+// The transfers of one client of the server: which are in the model, and which of them a result belongs to. The client
+// names them by its sequence numbers; the model knows them by ids that no two clients share.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-// TCP on this machine's loopback for the servers of the simulated device: a listener, a connection that never blocks,
+// TCP on this machine's loopback for the server of the simulated device: a listener, a connection that never blocks,
 // and one descriptor that wakes for all of them.
 #pragma once
 
@@ -63,9 +63,6 @@ class Stream
     // Bytes that have come, at most `most`; 0: none now, or the connection has ended.
     size_t receive(uint8_t *bytes, size_t most);
 
-    // Sends now what fits; the rest is the caller's to send again once the waker wakes. Returns how much went.
-    size_t send(const uint8_t *bytes, size_t count);
-
     // Sends all of it, keeping what does not fit; flush() sends more of that.
     void send_all(const Bytes &bytes);
     void flush();
@@ -73,6 +70,8 @@ class Stream
     bool ended() const;
 
   private:
+    size_t send(const uint8_t *bytes, size_t count);
+
     Descriptor socket_;
     Waker &waker_;
     Bytes unsent_;

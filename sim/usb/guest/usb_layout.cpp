@@ -15,7 +15,6 @@ constexpr size_t DEVICE_BYTES = 18;
 constexpr size_t INTERFACE_BYTES = 9;
 constexpr size_t ENDPOINT_BYTES = 7;
 constexpr uint8_t TYPE_MASK = 3;
-constexpr uint16_t PACKET_MASK = 0x7FF;
 
 void require(bool ok)
 {
@@ -31,13 +30,12 @@ uint16_t word(const uint8_t *bytes)
 
 UsbInterface read_interface(const uint8_t *bytes)
 {
-    return {bytes[2], bytes[5], bytes[6], bytes[7]};
+    return {bytes[5], bytes[6], bytes[7]};
 }
 
-UsbEndpoint read_endpoint(const uint8_t *bytes, uint8_t interface)
+UsbEndpoint read_endpoint(const uint8_t *bytes)
 {
-    return {bytes[2], static_cast<uint8_t>(bytes[3] & TYPE_MASK), static_cast<uint16_t>(word(bytes + 4) & PACKET_MASK),
-            bytes[6], interface};
+    return {bytes[2], static_cast<uint8_t>(bytes[3] & TYPE_MASK)};
 }
 
 void read_configuration(const Bytes &bytes, UsbLayout &layout)
@@ -55,7 +53,7 @@ void read_configuration(const Bytes &bytes, UsbLayout &layout)
             }
         } else if (one[1] == ENDPOINT && first_setting) {
             require(one[0] >= ENDPOINT_BYTES);
-            layout.endpoints.push_back(read_endpoint(one, layout.interfaces.back().number));
+            layout.endpoints.push_back(read_endpoint(one));
         }
     }
 }

@@ -9,13 +9,9 @@ namespace bridge_sim
 struct UsbEndpoint {
     uint8_t address = 0; // bit 7: to the host
     uint8_t type = 0;    // 0 control, 1 isochronous, 2 bulk, 3 interrupt
-    uint16_t packet = 0; // bytes
-    uint8_t interval = 0;
-    uint8_t interface = 0;
 };
 
 struct UsbInterface {
-    uint8_t number = 0;
     uint8_t interface_class = 0;
     uint8_t subclass = 0;
     uint8_t protocol = 0;

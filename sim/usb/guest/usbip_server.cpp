@@ -25,11 +25,21 @@ struct UsbipServer::Connection {
     bool over = false; // nothing more is read
 };
 
-UsbipServer::UsbipServer(uint16_t port) : GuestPort(port)
+UsbipServer::UsbipServer(uint16_t port) : listener_(port, waker_)
 {
 }
 
 UsbipServer::~UsbipServer() = default;
+
+uint16_t UsbipServer::port() const
+{
+    return listener_.port();
+}
+
+int UsbipServer::wake_descriptor() const
+{
+    return waker_.descriptor();
+}
 
 void UsbipServer::plug(const Descriptors &descriptors)
 {

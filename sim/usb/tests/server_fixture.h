@@ -1,4 +1,4 @@
-// What the servers' tests share: a device made of descriptors only, bytes of both protocols, and a client's socket.
+// What the server's test works with: a device made of descriptors only, and a client's socket.
 #pragma once
 
 #include "cmocka_cpp.h"

@@ -174,6 +174,17 @@ void transfers_go_there_and_back(void **)
     assert_true(client.receive(HEADER + 3) == due);
 }
 
+void interrupts_are_taken_by_themselves(void **)
+{
+    Attached attached;
+    auto &[server, client] = attached;
+    client.send(submit(5, 1, 2, 64));
+    const DeviceRequest request = client.await_request();
+    assert_true(request.urb.kind == UrbKind::INTERRUPT_IN && request.urb.length == 64);
+    complete(server, request, 0, {1});
+    assert_int_equal(client.receive(HEADER + 1)[HEADER], 1);
+}
+
 void errors_are_reported(void **)
 {
     Attached attached;
@@ -271,6 +282,7 @@ int main()
         cmocka_unit_test(list_shows_the_device),
         cmocka_unit_test(unplugged_it_is_not_listed_nor_imported),
         cmocka_unit_test(transfers_go_there_and_back),
+        cmocka_unit_test(interrupts_are_taken_by_themselves),
         cmocka_unit_test(errors_are_reported),
         cmocka_unit_test(unlink_ends_a_transfer),
         cmocka_unit_test(unlinked_data_is_not_lost),

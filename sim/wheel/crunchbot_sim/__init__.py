@@ -9,7 +9,6 @@ _PACKAGES = {
     "umockdev": "umockdev",
     "usb-1.0": "libusb-1.0-0",
     "hidapi-libusb": "libhidapi-libusb0",
-    "usbredirparser": "libusbredirparser1",
     "systemd": "libsystemd0",
 }
 
