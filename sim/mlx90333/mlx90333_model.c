@@ -101,7 +101,7 @@ void mlx90333_select(struct mlx90333 *sensor, uint64_t now_ns, bool level)
     sensor->level = true; /* t9: high impedance within 1 us; ones either way until the next clock */
 }
 
-static void mlx90333_model_make_frame(struct mlx90333 *sensor, const uint16_t words[3], uint16_t errors)
+static void mlx90333_model_make_frame(struct mlx90333 *sensor, const uint16_t words[2], uint16_t errors)
 {
     uint8_t *frame = sensor->frame;
     const unsigned end = sensor->parameters.sum_without_errors ? MLX90333_FRAME_ERRORS : MLX90333_FRAME_SUM;
@@ -109,7 +109,7 @@ static void mlx90333_model_make_frame(struct mlx90333 *sensor, const uint16_t wo
     frame[MLX90333_FRAME_START] = MLX90333_START_BYTE;
     whisker_put_u16(frame + MLX90333_FRAME_ALPHA, words[0]);
     whisker_put_u16(frame + MLX90333_FRAME_BETA, words[1]);
-    whisker_put_u16(frame + MLX90333_FRAME_ERRORS, sensor->parameters.field_mode ? words[2] : errors);
+    whisker_put_u16(frame + MLX90333_FRAME_ERRORS, errors);
     for (unsigned i = MLX90333_FRAME_ALPHA; i < end; i++)
         sum = (uint8_t)(sum + frame[i]);
     frame[MLX90333_FRAME_SUM] = sum;
@@ -118,11 +118,10 @@ static void mlx90333_model_make_frame(struct mlx90333 *sensor, const uint16_t wo
 /* The angle is latched at the last clock before the first data byte. */
 static void mlx90333_model_latch(struct mlx90333 *sensor, uint64_t now_ns)
 {
-    uint16_t words[3], errors;
+    uint16_t words[2];
+    const uint16_t errors = sensor->fault == SIM_SENSOR_ERROR_BITS ? sensor->argument : 0;
     sensor->latch_ns = now_ns;
-    sensor->age_ns = mlx90333_sense_latch(&sensor->sense, now_ns, words, &errors);
-    if (sensor->fault == SIM_SENSOR_ERROR_BITS)
-        errors |= sensor->argument;
+    sensor->age_ns = mlx90333_sense_latch(&sensor->sense, now_ns, words);
     mlx90333_model_make_frame(sensor, words, errors);
     if (errors && sensor->parameters.resets_after_error)
         sensor->reset_due = true; /* once this frame has been sent */

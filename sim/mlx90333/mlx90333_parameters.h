@@ -8,7 +8,6 @@
 /* Confidence letters as in the data-sheet header; `?` is not known: try both. */
 struct mlx90333_parameters {
     bool slow_mode;          /* EEPROM: 7 MHz instead of 20: three times the gaps, five times t5 (C) */
-    bool field_mode;         /* EEPROM XYZ: bytes 1 to 6 are X, Y, Z (B) */
     bool sum_without_errors; /* ? the sum covers bytes 1 to 4 only */
     bool resets_after_error; /* after a frame with an error word the part starts anew (A, sibling; ? this part) */
     bool early_byte_is_ones; /* ? a byte asked for before its gap is over is not loaded yet: the line stays high */
@@ -18,17 +17,13 @@ struct mlx90333_parameters {
         conversion_ns; /* 0: the field counts as it is at the latch; 200 000 typical, 350 000 most in fast mode, 600 000
                         * and 1 500 000 in slow (A sibling, C): then readings are 0 to one conversion old */
     uint8_t filter;    /* EEPROM 0 to 5: finite impulse response over the newest conversions (C) */
-    uint16_t clamp_low, clamp_high; /* EEPROM, counts */
-    uint16_t step_counts;        /* resolution: 16 for the 12 bits the data sheet quotes (A), 1 for the word's 16 (B) */
-    double span_deg;             /* EEPROM: degrees that 65536 counts stand for (D: 180) */
-    double k_alpha, k_beta, k_t; /* of the concentrator (A sibling: about 1.4, 1.4, 1.0); used with a field vector */
-    double noise_deg;            /* standard deviation of one conversion (C sibling: 0.2 peak to peak fast, 0.1 slow) */
-    double field_low_mt,
-        field_high_mt; /* EEPROM thresholds of the error bits; used with a field vector (A: 20 to 70) */
-    uint64_t seed;     /* phase of the conversions, noise, undefined resynchronisations */
+    uint16_t step_counts; /* resolution: 16 for the 12 bits the data sheet quotes (A), 1 for the word's 16 (B) */
+    double span_deg;      /* EEPROM: degrees that 65536 counts stand for (D: 180) */
+    double noise_deg;     /* standard deviation of one conversion (C sibling: 0.2 peak to peak fast, 0.1 slow) */
+    uint64_t seed;        /* phase of the conversions, noise, undefined resynchronisations */
 };
 
-/* A fast part that is read as at the latch, noise-free, 180 degrees, clamps open: what the chain runs on. */
+/* A fast part that is read as at the latch, noise-free, 180 degrees: what the chain runs on. */
 void mlx90333_parameters_default(struct mlx90333_parameters *parameters);
 
 #endif

@@ -5,27 +5,14 @@
 
 #include "sim_rng.h"
 
-#define DEG (45.0 / atan(1.0))
-#define ERROR_FIELD_LOW 0x0080u  /* F_FIELDTOOLOW */
-#define ERROR_FIELD_HIGH 0x0100u /* F_FIELDTOOHIGH */
-#define FULL_SCALE_MT 100.0      /* of a word in field mode: not documented, so any scale will do */
-
 /* Weights of filters 0 to 5 over the newest conversions (C). */
 static const uint8_t TAPS[6][MLX90333_FILTER_TAPS] = {{1},          {1, 1},       {1, 2, 1},
                                                       {1, 3, 3, 1}, {1, 1, 1, 1}, {1, 2, 2, 2, 1}};
 
 void mlx90333_parameters_default(struct mlx90333_parameters *parameters)
 {
-    *parameters = (struct mlx90333_parameters){.slow_permille = 1000,
-                                               .startup_ns = 16000000,
-                                               .clamp_high = 0xFFFF,
-                                               .step_counts = 16,
-                                               .span_deg = 180.0,
-                                               .k_alpha = 1.4,
-                                               .k_beta = 1.4,
-                                               .k_t = 1.0,
-                                               .field_low_mt = 20.0,
-                                               .field_high_mt = 70.0};
+    *parameters = (struct mlx90333_parameters){
+        .slow_permille = 1000, .startup_ns = 16000000, .step_counts = 16, .span_deg = 180.0};
 }
 
 static double mlx90333_sense_uniform(struct mlx90333_sense *sense)
@@ -54,38 +41,17 @@ bool mlx90333_sense_equal(const struct mlx90333_sense *a, const struct mlx90333_
 {
     const struct mlx90333_field *f = &a->field, *g = &b->field;
     return a->random == b->random && a->next_ns == b->next_ns && a->period_ns == b->period_ns &&
-           a->last_ns == b->last_ns && a->errors == b->errors && memcmp(a->taps, b->taps, sizeof a->taps) == 0 &&
-           f->since_ns == g->since_ns && f->is_vector == g->is_vector && f->alpha_deg == g->alpha_deg &&
-           f->beta_deg == g->beta_deg && f->alpha_deg_s == g->alpha_deg_s && f->beta_deg_s == g->beta_deg_s &&
-           memcmp(f->vector_mt, g->vector_mt, sizeof f->vector_mt) == 0;
-}
-
-void mlx90333_angles(const struct mlx90333_parameters *p, const double b[3], double angles_deg[2])
-{
-    angles_deg[0] = atan2(hypot(p->k_alpha * b[2], p->k_t * b[1]), b[0]) * DEG - 90.0;
-    angles_deg[1] = atan2(hypot(p->k_beta * b[2], p->k_t * b[0]), b[1]) * DEG - 90.0;
+           a->last_ns == b->last_ns && memcmp(a->taps, b->taps, sizeof a->taps) == 0 && f->since_ns == g->since_ns &&
+           f->alpha_deg == g->alpha_deg && f->beta_deg == g->beta_deg && f->alpha_deg_s == g->alpha_deg_s &&
+           f->beta_deg_s == g->beta_deg_s;
 }
 
 static void mlx90333_sense_angles_at(const struct mlx90333_sense *sense, uint64_t at_ns, double angles[2])
 {
     const struct mlx90333_field *f = &sense->field;
     const double since_s = ((double)at_ns - (double)f->since_ns) * 1e-9;
-    if (f->is_vector) {
-        mlx90333_angles(sense->parameters, f->vector_mt, angles);
-        return;
-    }
     angles[0] = f->alpha_deg + f->alpha_deg_s * since_s;
     angles[1] = f->beta_deg + f->beta_deg_s * since_s;
-}
-
-static uint16_t mlx90333_sense_errors_of(const struct mlx90333_sense *sense)
-{
-    const double *b = sense->field.vector_mt;
-    const double norm = sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2]);
-    if (!sense->field.is_vector)
-        return 0;
-    return (uint16_t)((norm < sense->parameters->field_low_mt ? ERROR_FIELD_LOW : 0u) |
-                      (norm > sense->parameters->field_high_mt ? ERROR_FIELD_HIGH : 0u));
 }
 
 static void mlx90333_sense_convert(struct mlx90333_sense *sense, uint64_t at_ns)
@@ -94,7 +60,6 @@ static void mlx90333_sense_convert(struct mlx90333_sense *sense, uint64_t at_ns)
     mlx90333_sense_angles_at(sense, at_ns, sense->taps[0]);
     for (int i = 0; i < 2 && sense->parameters->noise_deg > 0.0; i++)
         sense->taps[0][i] += sense->parameters->noise_deg * mlx90333_sense_normal(sense);
-    sense->errors = mlx90333_sense_errors_of(sense);
     sense->last_ns = at_ns;
 }
 
@@ -120,9 +85,9 @@ uint16_t mlx90333_counts(const struct mlx90333_parameters *p, double angle_deg)
 {
     const double steps = 65536.0 / p->step_counts, step = steps / 2.0 + angle_deg * (steps / p->span_deg);
     if (!isfinite(angle_deg))
-        return p->clamp_low;
+        return 0;
     const double whole = floor(mlx90333_sense_held(step, 0.0, steps - 1.0) + 0.5);
-    return (uint16_t)mlx90333_sense_held(whole * p->step_counts, p->clamp_low, p->clamp_high);
+    return (uint16_t)mlx90333_sense_held(whole * p->step_counts, 0.0, 65535.0);
 }
 
 static double mlx90333_sense_filtered(const struct mlx90333_sense *sense, int axis)
@@ -136,21 +101,13 @@ static double mlx90333_sense_filtered(const struct mlx90333_sense *sense, int ax
     return sum / weight;
 }
 
-static uint16_t mlx90333_sense_field_word(double mt)
-{
-    return (uint16_t)(int16_t)fmin(fmax(mt / FULL_SCALE_MT * 32767.0, -32767.0), 32767.0);
-}
-
-uint64_t mlx90333_sense_latch(struct mlx90333_sense *sense, uint64_t now_ns, uint16_t words[3], uint16_t *errors)
+uint64_t mlx90333_sense_latch(struct mlx90333_sense *sense, uint64_t now_ns, uint16_t words[2])
 {
     if (sense->period_ns == 0)
         mlx90333_sense_convert(sense, now_ns);
     else
         mlx90333_sense_convert_until(sense, now_ns);
-    *errors = sense->errors;
-    for (int i = 0; i < 3; i++)
-        words[i] = sense->parameters->field_mode ? mlx90333_sense_field_word(sense->field.vector_mt[i])
-                   : i < 2                       ? mlx90333_counts(sense->parameters, mlx90333_sense_filtered(sense, i))
-                                                 : 0;
+    for (int i = 0; i < 2; i++)
+        words[i] = mlx90333_counts(sense->parameters, mlx90333_sense_filtered(sense, i));
     return now_ns - sense->last_ns;
 }

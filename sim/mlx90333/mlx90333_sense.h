@@ -6,13 +6,11 @@
 
 #define MLX90333_FILTER_TAPS 5
 
-/* A field that moves: value at `since_ns` and rate. Angles in degrees from rest; vector in mT when one is given. */
+/* A field that moves: value at `since_ns` and rate. Angles in degrees from rest. */
 struct mlx90333_field {
     uint64_t since_ns;
     double alpha_deg, beta_deg;
     double alpha_deg_s, beta_deg_s; /* per second */
-    double vector_mt[3];            /* Bx, By, Bz */
-    bool is_vector;
 };
 
 struct mlx90333_sense {
@@ -23,7 +21,6 @@ struct mlx90333_sense {
     uint64_t period_ns;
     uint64_t last_ns; /* of the newest conversion */
     uint64_t random;
-    uint16_t errors; /* of the newest conversion */
 };
 
 /* `now_ns`: supply on. The parameters outlive it. */
@@ -32,19 +29,13 @@ void mlx90333_sense_start(struct mlx90333_sense *sense, const struct mlx90333_pa
 /* The field changes; `field->since_ns` is the present time and never goes back. */
 void mlx90333_sense_field(struct mlx90333_sense *sense, const struct mlx90333_field *field);
 
-/* What a frame latched at `now_ns` holds: alpha and beta, or the vector's words with field_mode, and the error word.
- * Returns the age of the conversion, ns. */
-uint64_t mlx90333_sense_latch(struct mlx90333_sense *sense, uint64_t now_ns, uint16_t words[3], uint16_t *errors);
+/* What a frame latched at `now_ns` holds: alpha and beta. Returns the age of the conversion, ns. */
+uint64_t mlx90333_sense_latch(struct mlx90333_sense *sense, uint64_t now_ns, uint16_t words[2]);
 
 /* The same field gives the same words from now on; of the parameters `a` and `b` have their own. */
 bool mlx90333_sense_equal(const struct mlx90333_sense *a, const struct mlx90333_sense *b);
 
-/* alpha = atan2(sqrt((k_alpha Bz)^2 + (k_t By)^2), Bx), beta = atan2(sqrt((k_beta Bz)^2 + (k_t Bx)^2), By), both minus
- * 90 degrees: from rest, where the field is along Z. Source: facts sheet of the MLX90363, whose names and ranges agree.
- */
-void mlx90333_angles(const struct mlx90333_parameters *parameters, const double vector_mt[3], double angles_deg[2]);
-
-/* Count for an angle from rest: rest is 0x8000, held between the clamps, rounded to the resolution. */
+/* Count for an angle from rest: rest is 0x8000, held within 16 bits, rounded to the resolution. */
 uint16_t mlx90333_counts(const struct mlx90333_parameters *parameters, double angle_deg);
 
 #endif

@@ -22,12 +22,6 @@ void set_field(struct bench *bench, double alpha_deg, double beta_deg)
     mlx90333_set_field(&bench->sensor, &field);
 }
 
-void set_vector(struct bench *bench, double x_mt, double y_mt, double z_mt)
-{
-    const struct mlx90333_field field = {.since_ns = bench->now, .vector_mt = {x_mt, y_mt, z_mt}, .is_vector = true};
-    mlx90333_set_field(&bench->sensor, &field);
-}
-
 void wake(struct bench *bench, uint64_t seed)
 {
     const struct bench legal = {.period = MLX90333_T1_NS,

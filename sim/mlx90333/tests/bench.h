@@ -25,7 +25,6 @@ void wake(struct bench *bench, uint64_t seed);
 void wake_as(struct bench *bench, const struct mlx90333_parameters *parameters);
 
 void set_field(struct bench *bench, double alpha_deg, double beta_deg);
-void set_vector(struct bench *bench, double x_mt, double y_mt, double z_mt);
 
 /* Clocks bits out, top first; returns what came in. */
 uint8_t clock_bits(struct bench *bench, uint8_t send, unsigned bits);

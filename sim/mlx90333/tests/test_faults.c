@@ -218,14 +218,11 @@ static void without_the_parameter_an_error_ends_in_no_reset(void **state)
     X(sense.field.beta_deg)                                                                                            \
     X(sense.field.alpha_deg_s)                                                                                         \
     X(sense.field.beta_deg_s)                                                                                          \
-    X(sense.field.vector_mt[2])                                                                                        \
-    X(sense.field.is_vector)                                                                                           \
     X(sense.taps[4][1])                                                                                                \
     X(sense.next_ns)                                                                                                   \
     X(sense.period_ns)                                                                                                 \
     X(sense.last_ns)                                                                                                   \
-    X(sense.random)                                                                                                    \
-    X(sense.errors)
+    X(sense.random)
 
 static void sensors_that_remember_different_things_are_not_equal(void **state)
 {

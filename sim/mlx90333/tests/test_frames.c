@@ -58,21 +58,6 @@ static void a_wrong_start_byte_gets_no_answer(void **state)
     assert_frame(frame, 0.0, 0.0, 0);
 }
 
-static void field_mode_sends_the_vector(void **state)
-{
-    (void)state;
-    struct mlx90333_parameters p = standard();
-    p.field_mode = true;
-    struct bench bench;
-    uint8_t frame[8];
-    wake_as(&bench, &p);
-    const struct mlx90333_field field = {.since_ns = bench.now, .vector_mt = {10, -20, 30}, .is_vector = true};
-    mlx90333_set_field(&bench.sensor, &field);
-    read_frame(&bench, 0xFF, frame);
-    assert_int_equal((int16_t)(frame[3] | frame[4] << 8) / (int16_t)(frame[1] | frame[2] << 8), -2);
-    assert_int_equal((int16_t)(frame[5] | frame[6] << 8) / (int16_t)(frame[1] | frame[2] << 8), 3);
-}
-
 static void the_sum_may_leave_the_error_word_out(void **state)
 {
     (void)state;
@@ -98,21 +83,6 @@ static void a_frame_is_eight_bytes(void **state)
     }
 }
 
-static void a_strong_field_saturates_its_word(void **state)
-{
-    (void)state;
-    struct mlx90333_parameters p = standard();
-    p.field_mode = true;
-    struct bench bench;
-    uint8_t frame[8];
-    wake_as(&bench, &p);
-    set_vector(&bench, 1e6, -1e6, 0.0);
-    read_frame(&bench, 0xFF, frame);
-    assert_int_equal((int16_t)(frame[1] | frame[2] << 8), 32767);
-    assert_int_equal((int16_t)(frame[3] | frame[4] << 8), -32767);
-    assert_int_equal(frame[5] | frame[6] << 8, 0);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -120,10 +90,8 @@ int main(void)
         cmocka_unit_test(the_angle_is_latched_at_the_end_of_the_start_byte),
         cmocka_unit_test(a_zero_from_the_master_pulls_the_line_low),
         cmocka_unit_test(a_wrong_start_byte_gets_no_answer),
-        cmocka_unit_test(field_mode_sends_the_vector),
         cmocka_unit_test(the_sum_may_leave_the_error_word_out),
         cmocka_unit_test(a_frame_is_eight_bytes),
-        cmocka_unit_test(a_strong_field_saturates_its_word),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
