@@ -1,7 +1,6 @@
-/* image_check vectors|handlers|boots N|resets: what the image does where no record shows it, as JSON.
+/* image_check vectors|boots N|resets: what the image does where no record shows it, as JSON.
  *
  * vectors: each interrupt and trap raised, in the application and in the loader: "returns" or "restarts".
- * handlers: cycles of the interrupts that mdb_table.py times on another simulator, raised alike.
  * boots: N supplies that come on with random memory: ticks until good records.
  * resets: each cause, on chips that keep their oscillator over a reset and on others: what the records hold, the clock
  * before and after, ticks lost. */
@@ -81,30 +80,6 @@ static void image_check_print_vectors(void)
 
 /* --------------------------------------------------------------------------------------------------------------- runs
  */
-
-/* One after the other on a node that is left alone. */
-static void image_check_print_handlers(void)
-{
-    static const struct {
-        uint8_t irq, handler;
-    } RAISED[] = {{IRQ_INT2, IMAGE_SELECT_UP_BROKEN},
-                  {IRQ_DMA1, IMAGE_ORDER},
-                  {IRQ_SPI2_ERROR, IMAGE_LINK_OVERFLOW},
-                  {IRQ_SPI1, IMAGE_BYTE},
-                  {IRQ_T2, IMAGE_READY},
-                  {IRQ_SPI1_ERROR, IMAGE_SENSOR_OVERRUN},
-                  {IRQ_INT1, IMAGE_SYNC}};
-    sim_node *node = image_check_started(false);
-    for (unsigned i = 0; i < sizeof RAISED / sizeof *RAISED; i++) {
-        image_check_raise_interrupt(node->chip, RAISED[i].irq);
-        sim_node_until(node, sim_node_fs(node) + MS_FS / 50u);
-        const struct image_costs costs = image_port_costs();
-        printf("%s%lu", i ? ", " : "[", (unsigned long)costs.handlers[RAISED[i].handler].last);
-        sim_node_until(node, sim_node_fs(node) + MS_FS);
-    }
-    printf("]\n");
-    sim_node_free(node);
-}
 
 enum { CALM = 5, LONGEST = 400, RUN = 20 };
 
@@ -202,14 +177,12 @@ int main(int argc, char **argv)
 {
     if (argc == 2 && strcmp(argv[1], "vectors") == 0) {
         image_check_print_vectors();
-    } else if (argc == 2 && strcmp(argv[1], "handlers") == 0) {
-        image_check_print_handlers();
     } else if (argc == 3 && strcmp(argv[1], "boots") == 0) {
         image_check_print_boots((unsigned)strtoul(argv[2], NULL, 10));
     } else if (argc == 2 && strcmp(argv[1], "resets") == 0) {
         image_check_print_resets();
     } else {
-        fprintf(stderr, "image_check: wants vectors, handlers, boots and how many, or resets\n");
+        fprintf(stderr, "image_check: wants vectors, boots and how many, or resets\n");
         return 2;
     }
     return 0;

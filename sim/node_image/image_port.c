@@ -158,7 +158,6 @@ static void image_port_note(struct image_cost *cost, uint64_t cycles, uint64_t a
         cost->acts = (uint32_t)acted;
     if (stack > cost->stack)
         cost->stack = stack;
-    cost->last = (uint32_t)cycles;
     cost->count++;
 }
 

@@ -35,9 +35,9 @@ enum image_handler { IMAGE_HANDLERS(IMAGE_HANDLER) IMAGE_HANDLER_COUNT };
 
 struct image_cost {
     uint64_t count;
-    uint32_t last, least, most; /* cycles from the first instruction to the return, that included */
-    uint32_t acts;              /* most cycles to the last register written that the outside sees */
-    uint16_t stack;             /* bytes, the processor's own four included */
+    uint32_t least, most; /* cycles from the first instruction to the return, that included */
+    uint32_t acts;        /* most cycles to the last register written that the outside sees */
+    uint16_t stack;       /* bytes, the processor's own four included */
 };
 
 struct image_costs {

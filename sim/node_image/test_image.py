@@ -125,21 +125,6 @@ def test_the_supply_may_fail_at_each_step_of_an_update(image, tmp_path):
             assert one["fate"] & step["allowed"] and one["reported"] and one["again"] and one["ticks"] <= 90, step
 
 
-def test_the_script_for_another_simulator_times_each_interrupt_once():
-    """The script only: there is no simulator of the vendor's here."""
-    command = [sys.executable, HERE / "mdb_table.py", WIRE, "--build-dir", PROGRAMS.parents[1]]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    lines = done.stdout.splitlines()
-    assert lines.count("print /d TMR1") == len(IRQS)
-    reported = [int(line.split(": ")[1].split()[0]) for line in lines if line.startswith("echo")]
-    assert len(reported) == len(IRQS) and all(20 < cycles < 2000 for cycles in reported)
-    stops = [int(line.split("*")[1], 16) // 2 for line in lines if line.startswith("break")]
-    words = translate.flash_words(WIRE)
-    assert set(stops[::2]) == set(paths.handlers(words, IRQS).values())
-    assert all(words[at] == 0x064000 for at in stops[1::2])
-
-
 @pytest.mark.skipif(not LONG, reason="long: make firmware-check")
 def test_the_supply_may_fail_at_any_time_of_an_update(image):
     done = image.run("image_cuts")
