@@ -96,7 +96,7 @@ firmware-images: ## make the committed image again, twice: PIC30=DIR
 	@tools/firmware/images.sh
 
 firmware-check: build ## execute the node's image against the firmware's C, at length; or IMAGE=node_wire.hex, built by anyone
-	@WHISKER_BUILD=$(BUILD) WHISKER_IMAGE_LONG=1 WHISKER_IMAGE="$(abspath $(IMAGE))" $(PYTHON) -m pytest --quiet sim/node_image
+	@WHISKER_BUILD=$(BUILD) WHISKER_IMAGE_LONG=1 WHISKER_IMAGE="$(abspath $(IMAGE))" $(PYTHON) -m pytest --quiet tests/rigs/node_image
 
 flash: ## first programming of a node by wire, no compiler needed: TOOL=ipecmd|pk2cmd|picberry SERIAL=n [HEX=file]
 	@tools/firmware/flash.sh --tool "$(TOOL)" $(if $(SERIAL),--serial "$(SERIAL)") $(if $(HEX),--hex "$(HEX)")

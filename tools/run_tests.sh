@@ -23,17 +23,17 @@ if [ "${1:-}" = --long ]; then
         .venv/bin/python fpga/boards/build.py "$board"
     done
     echo "test: 40 faults of each board, and longer runs"
-    build/release/sim/bridge/boards/test_boards 40 "$(date +%j)" 300
+    build/release/tests/rigs/boards/test_boards 40 "$(date +%j)" 300
     echo "test: the netlist of a board from pin to pin"
     cmake --build build/release --target test_netlist >build/netlist.log 2>&1 || { tail -25 build/netlist.log >&2; exit 1; }
-    build/release/sim/bridge/boards/test_netlist
+    build/release/tests/rigs/boards/test_netlist
     echo "test: larger models of the ring, and 100000 readers and writers killed"
     host/libwhisker/model/check.sh --long
     build/release/host/libwhisker/test/stress_ring 100000
     echo "test: the bridge's two levels by more seeds"
     build/release/sim/bridge/tests/test_bridge_mixed 100
     echo "test: the node's image, ten thousand ticks, each step of an update"
-    WHISKER_BUILD=build/release WHISKER_IMAGE_LONG=1 .venv/bin/python -m pytest --quiet sim/node_image
+    WHISKER_BUILD=build/release WHISKER_IMAGE_LONG=1 .venv/bin/python -m pytest --quiet tests/rigs/node_image
     if command -v doxygen >/dev/null; then
         echo "test: the site of pages and API"
         (cd tools && ../.venv/bin/python -m handbook)

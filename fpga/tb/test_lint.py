@@ -13,7 +13,7 @@ NOT_JUDGED = """\
 `verilator_config
 lint_off -file "*/usb_stub.v"
 lint_off -file "*/whisker_fs_phy.v"
-lint_off -file "*/sim/bridge/boards/cells.v"
+lint_off -file "*/tests/rigs/boards/cells.v"
 """
 
 

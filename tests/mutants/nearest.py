@@ -41,7 +41,7 @@ def steps_for(root: Path, file: str) -> list[Step]:
             Step(pytest=_benches(root, file)),
             Step(
                 build=("all",),
-                ctest=("sim/usb", "sim/bridge", "sim/robot", "tests/usb", "fpga"),
+                ctest=("sim/usb", "sim/bridge", "sim/robot", "tests/usb", "tests/rigs/boards", "fpga"),
                 pytest=(PROOFS, BENCHES),
             ),
         ]

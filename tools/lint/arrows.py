@@ -39,14 +39,6 @@ ALLOWED = {
     "sim/mlx90333": ["sim/common", "sim/node", "firmware/dspic"],  # one copy of the data sheet
     "sim/dspic": ["firmware/dspic"],  # addresses and bits, and what the accessors call
     "sim/node": ["sim/common", "sim/mlx90333", "sim/dspic", "firmware/dspic"],
-    "sim/node_image": [
-        "sim/common",
-        "sim/node",
-        "sim/mlx90333",
-        "sim/dspic",
-        "firmware/dspic",
-        "protocol",
-    ],  # the image's header
     "sim/mechanics": ["sim/common", "host/nav/problem"],  # interpolation
     "sim/world": ["sim/common", "sim/mechanics"],
     "sim/signals": ["sim/common", "sim/world", "sim/mechanics", "sim/mlx90333", "sim/node"],

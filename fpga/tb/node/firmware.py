@@ -1,4 +1,4 @@
-"""The node's firmware on its register model, through the shared library that the build makes of sim/node."""
+"""The node's firmware on its register model, through the shared library that the build makes of tests/rigs/node."""
 
 import ctypes
 import os
@@ -12,7 +12,7 @@ LOST_CLOCK = 7
 
 
 def _library() -> ctypes.CDLL:
-    path = REPO / os.environ.get("WHISKER_BUILD", "build/release") / "sim/node/libsim_node_pins.so"
+    path = REPO / os.environ.get("WHISKER_BUILD", "build/release") / "tests/rigs/node/libsim_node_pins.so"
     if not path.exists():
         raise FileNotFoundError(f"{path}: the bench of node and bridge needs it; run 'make build' first")
     library = ctypes.CDLL(str(path))

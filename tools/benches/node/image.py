@@ -14,7 +14,7 @@ from .. import store
 
 ROOT = Path(__file__).resolve().parents[3]
 IMAGE = ROOT / "firmware/images/node_wire.hex"
-sys.path.insert(0, str(ROOT / "sim/node_image"))
+sys.path.insert(0, str(ROOT / "tests/rigs/node_image"))
 import paths  # noqa: E402
 import translate  # noqa: E402
 
@@ -41,7 +41,7 @@ class Node:
     """Programs with the image in them; what its interrupts cost, over all runs."""
 
     def __init__(self, build: Path, folder: Path):
-        self.programs, self.folder = build / "sim/node_image", folder
+        self.programs, self.folder = build / "tests/rigs/node_image", folder
         self.words = translate.flash_words(IMAGE)
         self.table = folder / "table"
         self.table.write_bytes(translate.table_of(self.words))

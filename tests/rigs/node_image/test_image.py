@@ -14,13 +14,13 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
+ROOT = HERE.parents[2]
 sys.path.insert(0, str(HERE))
 import paths  # noqa: E402
 import translate  # noqa: E402
 from translate import patches  # noqa: E402
 
-PROGRAMS = ROOT / os.environ.get("WHISKER_BUILD", "build/release") / "sim/node_image"
+PROGRAMS = ROOT / os.environ.get("WHISKER_BUILD", "build/release") / "tests/rigs/node_image"
 COMMITTED = ROOT / "firmware/images/node_wire.hex"
 WIRE = Path(os.environ.get("WHISKER_IMAGE") or COMMITTED)
 LONG = "WHISKER_IMAGE_LONG" in os.environ

@@ -51,7 +51,7 @@ struct image_table *image_table_read(const char *path)
         fclose(file);
     if (whole)
         return table;
-    fprintf(stderr, "image: %s: no table of an image; make it with sim/node_image/translate.py\n", path);
+    fprintf(stderr, "image: %s: no table of an image; make it with tests/rigs/node_image/translate.py\n", path);
     image_table_free(table);
     return NULL;
 }

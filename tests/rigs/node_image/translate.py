@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pypcode
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "tools/firmware"), str(Path(__file__).resolve().parent)]
 import intel_hex  # noqa: E402
 import patches  # noqa: E402

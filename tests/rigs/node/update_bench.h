@@ -19,7 +19,7 @@ struct update_image {
     uint8_t bytes[WHISKER_IMAGE_HEADER_BYTES + UPDATE_BODY];
 };
 
-/* The application's rows: some bytes that differ with the version (update_body.c), or a program (sim/node_image). */
+/* The application's rows: some bytes that differ with the version (update_body.c), or a program (image_flash.c). */
 void sim_update_body_fill(uint8_t body[UPDATE_BODY], uint16_t version);
 
 /* An application of those rows; update_seal() makes its header's CRC right again after a change. */
