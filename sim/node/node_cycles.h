@@ -3,8 +3,8 @@
  *
  * X(name, register, acts, whole): `acts` until it first writes the register by which it does what others wait for (0:
  * there is none), `whole` until its return is done. The processor's entry comes on top. Source: the images of
- * firmware/images, run instruction by instruction (tests/rigs/node_image) for 10000 ticks with random faults, and through
- * service orders; of three images, the longest. */
+ * firmware/images, run instruction by instruction (tests/rigs/node_image) for 10000 ticks with random faults, and
+ * through service orders; of three images, the longest. */
 #ifndef NODE_CYCLES_H
 #define NODE_CYCLES_H
 
