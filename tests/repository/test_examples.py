@@ -28,8 +28,6 @@ OFFLINE = {
     "whisker map": '"faces": ',
     "whisker scene make": "scenes/7: anchor+kidnap, seed 7, 1200 rows",
     "whisker scene map": "scenes/mapped: examples/scene with examples/home.yaml, 1 boxes",
-    "whisker bench touch": "adaptive",
-    "whisker bench map": "error_median_m: ",
     "whisker texture train": "3 classes: ROUGH, SMOOTH, VINYL",
     "whisker texture classify": '"label": "ROUGH"',
     "whisker radial fit": "chosen",

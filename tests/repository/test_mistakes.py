@@ -48,8 +48,6 @@ MISTAKES = {
     "whisker scene from nosuch --out s": ("no recording with observation rows", "give the folder of a run"),
     "whisker scene from examples/drive.mcap --out s": ("holds no arena.toml", "give a bag of a robot"),
     "whisker scene map examples/scene examples/home.pgm --out s": ("not a text file", "give a map server's YAML"),
-    "whisker bench touch --scene nosuch --filter adaptive": ("neither on the list", "choose one of anchor, "),
-    "whisker bench touch --scene anchor+global": ("needs --estimate or --filter", "one of them"),
     "whisker info --ring nosuch": ("there is no ring of this name", "start whiskerd with this --ring"),
     "whisker record": ("required: FILE.MCAP", "see 'whisker record --help'"),
     "whisker record examples/drive.mcap --ring nosuch": ("there is no ring", "start whiskerd with this --ring"),

@@ -44,7 +44,6 @@ COMMANDS = {
     "localise": "where the robot was, row by row of a scene folder",
     "map": "a map of an unknown arena by touch alone, from the rows of a scene folder",
     "scene": "make scene folders for localise",
-    "bench": "score estimates of any engine on a fixed list of scenes and logs",
     "texture": "learn and classify floor surfaces",
     "radial": "learn and estimate the distance of contacts along a whisker",
 }
@@ -58,7 +57,7 @@ EXTRAS = {
 }
 PACKAGE_EXTRAS = {"cyclonedds": "cyclonedds"}  # of a package that only one way of a command needs
 SHELLS = ("bash", "zsh", "tcsh")
-LAB_COMMANDS = ("bridge-sim", "scene", "bench")  # of the package crunchbot_lab
+LAB_COMMANDS = ("bridge-sim", "scene")  # of the package crunchbot_lab
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -109,7 +109,7 @@ def truth_of(folder: Path) -> np.ndarray:
 
 
 def judge_map(out: Path, scene: scenes.Scene) -> dict:
-    """The figures of `whisker bench map`, and the motion that brings the map's frame onto the arena's."""
+    """How good the map is (`map_scoring`), and the motion that brings the map's frame onto the arena's."""
     explore = out / "explore"
     truth = truth_of(explore)
     rows = localise.read_observations(localise.observations_path(explore / "scene"), scene)

@@ -1,4 +1,4 @@
-"""Poses and a map that any SLAM has made, from a folder: what `whisker bench map` judges.
+"""Poses and a map as `whisker map` and the mapper write them, from a folder, to be judged.
 
 est.csv      poses of the rows, the first row's too (docs/formats.md); the only file that must be there. Rows without a
              pose are carried on by the odometry.
@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from crunchbot.nav.estimates import read_estimates
 from crunchbot.nav.filters import ESTIMATE
 from crunchbot.nav.mapper import FACE, Lattice, TouchMap
 from crunchbot.nav.mapping import ESTIMATES, FACES, MAP, Mapped
@@ -24,7 +23,9 @@ from crunchbot.tables import TableError, numbers, read_columns
 from .geometry import compose
 
 ENDS, NORMAL = ("x0_m", "y0_m", "x1_m", "y1_m"), "normal_rad"
+POSE = ("x_m", "y_m", "theta_rad")
 COVARIANCE = ("xx_m2", "xy_m2", "yy_m2")
+SAME_S = 1e-3  # times that differ by less are the same row's
 
 
 def read_map_folder(folder: str | Path, scene: Scene, rows: Observations) -> tuple[Mapped, np.ndarray | None]:
@@ -44,19 +45,42 @@ def read_map_folder(folder: str | Path, scene: Scene, rows: Observations) -> tup
 
 def _table(path: Path, rows: Observations) -> np.ndarray:
     """(n,) of ESTIMATE, with nan where no covariance is given."""
-    given = read_estimates(path, path.stem, rows)
-    if given.rows[0] != 0:
+    text = read_columns(path, [*POSE])
+    poses = np.column_stack([numbers(text[key]) for key in POSE])
+    at = _rows_of(path, text, len(poses), rows)
+    if not len(at) or at[0] != 0:
         raise TableError(path, 2, "no pose of the first row; give one, the others are counted from it")
-    table, text = np.zeros(len(rows), ESTIMATE), read_columns(path, [])
+    table = np.zeros(len(rows), ESTIMATE)
     table["covariance"] = np.nan
-    place = dict(zip(given.rows.tolist(), given.poses, strict=True))
-    pose = given.poses[0]
+    place = dict(zip(at.tolist(), poses, strict=True))
+    pose = poses[0]
     for n, step in enumerate(np.where(np.isfinite(rows.odometry), rows.odometry, 0.0)):
         table["pose"][n] = pose = place.get(n, compose(pose, step))
     if set(COVARIANCE) <= text.keys():
         xx, xy, yy = (numbers(text[name]) for name in COVARIANCE)
-        table["covariance"][given.rows, :2, :2] = np.stack([xx, xy, xy, yy], axis=-1).reshape(-1, 2, 2)
+        table["covariance"][at, :2, :2] = np.stack([xx, xy, xy, yy], axis=-1).reshape(-1, 2, 2)
     return table
+
+
+def _rows_of(path: Path, text: dict, count: int, rows: Observations) -> np.ndarray:
+    """The row of each line: with as many lines as rows they are taken in order; else each is found by its t_s."""
+    if count == len(rows):
+        return np.arange(count)
+    if "t_s" not in text:
+        raise TableError(
+            path, 1, f"{count} rows, the scene has {len(rows)}; give one for each, or add the column 't_s'"
+        )
+    times, known = numbers(text["t_s"]), rows.t_s
+    order = np.argsort(known, kind="stable")
+    at = order[np.clip(np.searchsorted(known[order], times - SAME_S), 0, len(known) - 1)]
+    wrong = np.nonzero(~(np.abs(known[at] - times) <= SAME_S))[0]
+    if len(wrong):
+        reported = f"t_s {text['t_s'][wrong[0]]} is no row's of the scene; give those of it"
+        raise TableError(path, int(wrong[0]) + 2, reported)
+    if (np.diff(at) <= 0).any():
+        line = int(np.nonzero(np.diff(at) <= 0)[0][0]) + 3
+        raise TableError(path, line, "t_s is not later than the line before; give rows in order, each once")
+    return at
 
 
 def map_frame(mapped: Scene | None) -> Pose:

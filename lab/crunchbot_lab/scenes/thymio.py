@@ -12,7 +12,6 @@ import numpy as np
 
 from crunchbot.files import UnreadableError, read_text
 from crunchbot.images import nearest_levels, read_grey
-from crunchbot.nav.estimates import Estimates
 from crunchbot.nav.observations import Observations
 from crunchbot.scene import Arena, Prior, Robot, Scene, Whisker
 from crunchbot.tables import TableError, number
@@ -29,7 +28,6 @@ BLACK_COUNT, WHITE_COUNT = 60.0, 750.0  # of the analogue-digital converter
 SIGMA = 0.15  # of a reading on one colour, as a share of the way from black to white
 BORDER_SHARE, BORDER_LEVELS = 0.2, 1.5  # readings at cell borders: any level, evenly over so many times that way
 ODOMETRY_RELATIVE = 0.1
-PUBLISHED, LOG_NUMBERS = "published", 8  # folder beside the recording's, of logs pub_<recording>.<engine>
 RADIAL_M = 0.005  # no whisker reads it
 
 
@@ -60,33 +58,16 @@ def read_thymio(path: Path, warn: Callable[[str], None]) -> tuple[Scene, Observa
     return scene, rounded(Observations(times, [], odometry, _loglik(counts), np.empty((rows, 0)), truth))
 
 
-def published(path: Path, observations: Observations) -> tuple[Estimates, ...]:
-    """What the recording's authors published of it: their logs in the folder beside, one of each engine.
-
-    A line of a log: line of the recording from 0, seconds for the step, truth x, y (cm) and heading, estimate x, y (cm)
-    and heading; more numbers are not read.
-    """
-    out = []
-    for log in sorted((path.resolve().parent / PUBLISHED).glob(f"*{path.resolve().name}.*")):
-        table = _numbers(log, LOG_NUMBERS, more=True)
-        lines = table[:, 0]
-        if not ((lines >= 1) & (lines <= len(observations)) & (np.diff(lines, prepend=0) > 0)).all():
-            raise TableError(log, None, f"names lines outside 1 to {len(observations)}, or not in order; mend it")
-        poses = np.column_stack([table[:, 5:7] / 100.0, table[:, 7]])
-        out.append(Estimates(f"published {log.suffix[1:]}", lines.astype(int) - 1, poses, step_us=table[:, 1] * 1e6))
-    return tuple(out)
-
-
-def _numbers(path: Path, width: int, more: bool = False) -> np.ndarray:
-    """(lines, width); a cell that is no number is nan. more: a line may hold others behind those."""
+def _numbers(path: Path, width: int) -> np.ndarray:
+    """(lines, width); a cell that is no number is nan."""
     try:
         lines = [line.split() for line in read_text(path).splitlines()]
     except UnreadableError as error:
         raise TableError(path, None, f"{error}; give a text file of numbers") from error
     for index, cells in enumerate(lines, start=1):
-        if len(cells) < width or (len(cells) > width and not more):
+        if len(cells) != width:
             raise TableError(path, index, f"{len(cells)} numbers where {width} belong; give every line all its numbers")
-    return np.array([[number(cell) for cell in cells[:width]] for cells in lines]).reshape(len(lines), width)
+    return np.array([[number(cell) for cell in cells] for cells in lines]).reshape(len(lines), width)
 
 
 def _motions(places: np.ndarray, headings: np.ndarray) -> np.ndarray:

@@ -1,15 +1,12 @@
 """Kidnaps while mapping: said when they are, not said when they are not, and judged right."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from mapkit import MANY, SEEDS, map_made, mapped
 
-from crunchbot import cli
-from crunchbot_lab.scenes import map_events, own_map, write_scene
-from crunchbot_lab.scenes.making import make
+from crunchbot_lab.scenes import map_events, own_map
 from crunchbot_lab.scenes.map_scoring import best_motion
 
 ROWS, CARRIED = 3000, "free+carried"
@@ -97,15 +94,3 @@ def test_a_drive_is_located_in_the_map_that_the_robot_made():
     (drive,) = own_map.score(run, "anchor", 4, 1)
     assert drive.own.rows_to_lock is not None and drive.true.rows_to_lock is not None
     assert drive.own.error_m < 0.06 and drive.true.error_m < 0.02
-
-
-def test_the_command_judges_the_own_map(tmp_path, capsys):
-    words = ["bench", "map", "--scene", "anchor", "--seed", "4", "--rows", "1000", "--json", "--own"]
-    assert cli.main(words) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["parts"] == 1.0
-    assert found["true_map_error_m"] < 0.03 and "own_map_rows_to_lock" in found
-    made = make("anchor", 4, 100)
-    write_scene(tmp_path, made.scene, made.observations)
-    assert cli.main(["bench", "map", "--scene", str(tmp_path), "--own"]) != 0
-    assert "--own" in capsys.readouterr().err

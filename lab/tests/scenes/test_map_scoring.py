@@ -1,12 +1,12 @@
 """The scorer of maps: right maps score full marks, and each thing that is wrong costs its own figure."""
 
-import json
 import math
 
 import numpy as np
 import pytest
 
 from crunchbot import cli
+from crunchbot.nav import mapping
 from crunchbot.nav.mapper import FACE, TouchMap
 from crunchbot.tables import TableError
 from crunchbot_lab.scenes import map_reading, map_scoring, write_scene
@@ -76,21 +76,6 @@ def test_regions_that_are_too_small_hold_less(scene):
     assert map_scoring.coverage(poses, covariance / 16, truth) < 0.4
 
 
-def test_the_command_scores_the_mapper_and_the_poses_of_others(scene, tmp_path, capsys):
-    assert cli.main(["bench", "map", "--scene", "anchor", "--seed", "3", "--rows", "800", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["error_median_m"] < 0.05 and found["tiles_right"] > 0.9
-    write_scene(tmp_path, scene.scene, scene.observations)
-    truth = scene.observations.truth
-    lines = [",".join(map(repr, row)) for row in truth.tolist()]
-    (tmp_path / "est.csv").write_text("\n".join(["x_m,y_m,theta_rad", *lines]) + "\n")
-    words = ["bench", "map", "--scene", str(tmp_path), "--estimate", str(tmp_path / "est.csv"), "--json"]
-    assert cli.main(words) == 0
-    assert json.loads(capsys.readouterr().out)["error_median_m"] == pytest.approx(0.0, abs=1e-9)
-    assert cli.main(["bench", "map", "--scene", "no-such-family"]) != 0
-    assert capsys.readouterr().err.count("\n") == 1
-
-
 @pytest.fixture(scope="module")
 def mapped_folder(scene, tmp_path_factory):
     """A scene folder, and what `whisker map` writes of it."""
@@ -100,24 +85,18 @@ def mapped_folder(scene, tmp_path_factory):
     return where
 
 
-def test_a_folder_of_any_slam_is_judged_as_the_mapper_itself(mapped_folder, capsys):
-    where = mapped_folder
-    (where / "poses").mkdir()
-    (where / "poses/est.csv").write_text((where / "map/est.csv").read_text())
-    capsys.readouterr()
-    names = [str(where / name) for name in ("map", "poses")]
-    assert cli.main(["bench", "map", *names, "--scene", str(where / "scene"), "--json"]) == 0
-    whole, poses = json.loads(capsys.readouterr().out).values()
-    assert cli.main(["bench", "map", "--scene", str(where / "scene"), "--json"]) == 0
-    mapper = json.loads(capsys.readouterr().out)
+def test_what_the_command_writes_is_judged_as_the_mapper_itself(scene, mapped_folder):
+    arena, rows = scene.scene.arena, scene.observations
+    read, cells = map_reading.read_map_folder(mapped_folder / "map", scene.scene, rows)
+    whole = map_scoring.judged(read, arena)
+    mapper = map_scoring.judged(mapping.run(scene.scene.robot, arena.textures, rows, quiet=True), arena)
     for key in ("error_median_m", "anchored_median_m", "coverage_90", "odometry_error_median_m", "tiles_right"):
         assert whole[key] == pytest.approx(mapper[key], abs=2e-5), key
+    assert whole["error_median_m"] < 0.05 and whole["tiles_right"] > 0.9
     assert whole["faces_right"] == pytest.approx(mapper["faces_right"], abs=0.02)
-    assert whole["free_right"] > 0.95 and whole["solid_right"] > 0.8
-    assert poses["error_median_m"] == whole["error_median_m"] and poses["faces_right"] is None
-    assert poses["corners_found"] is None and poses["free_right"] is None
-    assert cli.main(["bench", "map", names[0], "--scene", str(where / "scene")]) == 0
-    assert capsys.readouterr().out.splitlines()[-1].startswith("odometry")
+    motion = map_scoring.best_motion(read.table["pose"][:, :2], rows.truth[:, :2])
+    free = map_scoring.cells_score(cells, motion, arena)
+    assert free["free_right"] > 0.95 and free["solid_right"] > 0.8
 
 
 def test_an_occupancy_that_is_off_is_wrong(scene, mapped_folder):

@@ -19,10 +19,7 @@ def write_log(folder: Path, floor: np.ndarray, path: np.ndarray, left: Sequence[
     np.savetxt(folder / "sensor_right.txt", right)
 
 
-def write_published(folder: Path, rows: int) -> None:
-    """A log of `rows` lines on a chessboard, with a published estimate of every tenth line."""
+def write_plain(folder: Path, rows: int) -> None:
+    """A log of `rows` lines on a chessboard."""
     path = np.column_stack([0.1 + 0.01 * np.arange(rows), np.full(rows, 0.25), np.zeros(rows)])
     write_log(folder, np.indices((50, 50)).sum(axis=0) % 2 * 255, path, [60.0] * rows, [60.0] * rows)
-    (folder.parent / "published").mkdir()
-    lines = [f"{n} 2.5 0 0 0 {100 * path[n, 0]} 25 0 0 0 0" for n in range(10, rows, 10)]
-    (folder.parent / f"published/pub_{folder.name}.theirs").write_text("\n".join(lines) + "\n")
