@@ -57,6 +57,7 @@ EXTRAS = {
 }
 PACKAGE_EXTRAS = {"cyclonedds": "cyclonedds"}  # of a package that only one way of a command needs
 SHELLS = ("bash", "zsh", "tcsh")
+PARTS = ("pilot", "navigator", "mapper", "bag")  # processes that `robot` starts: not in the list of --help
 LAB_COMMANDS = ("bridge-sim", "scene")  # of the package crunchbot_lab
 
 
@@ -108,12 +109,13 @@ def parser_of(chosen: str | None = None) -> Parser:
     """The parser of the whole command line, with the arguments of the chosen subcommand only; None: of all whose packages
     are installed."""
     width = max(map(len, COMMANDS))
-    listed = "\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())
+    listed = "\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items() if name not in PARTS)
+    started = f"'whisker robot' starts {', '.join(PARTS)}; each has its own --help"
     purpose = "Whiskered robots: sensing, tactile perception, localisation by touch."
     parser = Parser(
         prog="whisker",
         usage="whisker [--version] [--print-completion SHELL] COMMAND ...",
-        description=f"{purpose}\n\ncommands:\n{listed}",
+        description=f"{purpose}\n\ncommands:\n{listed}\n\n{started}",
     )
     parser.show_example("whisker bridge-sim &  whisker top")
     parser.add_argument("--version", action="version", version=f"whisker {__version__}")
