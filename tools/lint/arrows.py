@@ -28,7 +28,7 @@ ALLOWED = {
         "host/nav/belief",
         "host/nav/filter",
     ],  # rows of a replay
-    "host/nav/planning": [],
+    "host/nav/planning": ["host/nav/problem"],
     "host/nav": [],
     "host/create": [],
     "host/command_line": [],

@@ -21,6 +21,8 @@
 /* Cells of a group; and the sums of a slice: its mass and that times x, y, xx, xy, yy, relative to some place. */
 enum { NAV_LANES = 8, NAV_MOMENTS = 6 };
 
+#define NAV_LEVER_M 0.2 /* from the robot's middle to what a whisker meets, about: a turn moves that so far */
+
 /* Division of an arena into cells. */
 struct nav_shape {
     int nx, ny, nh;

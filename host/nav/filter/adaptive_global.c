@@ -65,7 +65,7 @@ static void global_move_row(struct adaptive_global *g, const struct adaptive_ent
 /* How far the whiskers have gone in a step, m. */
 static double global_path(struct nav_pose step)
 {
-    return hypot(step.x, step.y) + 0.2 * fabs(step.theta);
+    return hypot(step.x, step.y) + NAV_LEVER_M * fabs(step.theta);
 }
 
 /* Rows between which nothing is read while the belief is too wide to keep up: the further behind, the longer the way.
@@ -435,7 +435,7 @@ static int global_tables(struct adaptive_global *g)
     const struct nav_problem *problem = g->problem;
     const struct nav_shape *s = &g->histogram.shape;
     /* A look-up stands for a part of a cell: that spreads the distances it should give. */
-    double blur = hypot(s->cell / SUB, 0.2 * s->cell_theta / TURNS) / sqrt(12.0);
+    double blur = hypot(s->cell / SUB, NAV_LEVER_M * s->cell_theta / TURNS) / sqrt(12.0);
     g->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, blur);
     if (!g->likelihood)
         return -1;

@@ -139,7 +139,7 @@ static bool grid_make_tables(struct grid *g)
     const struct nav_shape *shape = &g->histogram.shape;
     int sub = (int)s->grid.sub, turns = (int)s->grid.sub_heading;
     /* A look-up stands for poses within half a step and half a turn: that spreads the distances it should give. */
-    double blur = hypot(shape->cell / sub, 0.2 * shape->cell_theta / turns) / sqrt(12.0);
+    double blur = hypot(shape->cell / sub, NAV_LEVER_M * shape->cell_theta / turns) / sqrt(12.0);
     g->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, blur);
     if (g->likelihood)
         g->expected = nav_expected_new(g->likelihood, shape->cell, shape->nh, sub, turns);

@@ -4,9 +4,10 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
+#include "pose.h"
+
 enum { COVERAGE_HEADINGS = 8, COVERAGE_NEW = -1, COVERAGE_SETTLED = -2, COVERAGE_NOWHERE = -1 };
 
-static const double COVERAGE_CIRCLE = 6.283185307179586, COVERAGE_EIGHTH = 0.7853981633974483;
 static const double COVERAGE_STRAIGHT_RAD = 0.05; /* a smaller turn is made on the way */
 static const double COVERAGE_PASSED_LEAST = 1e-4; /* ways that are less likely to be free are not followed */
 static const int COVERAGE_DX[] = {1, 1, 0, -1, -1, -1, 0, 1}, COVERAGE_DY[] = {0, 1, 1, 1, 0, -1, -1, -1};
@@ -160,7 +161,7 @@ static void coverage_turn(struct nav_coverage *c, int state, int by)
 {
     struct coverage_state next = c->state[state];
     int cell = state / COVERAGE_HEADINGS, heading = (state + by + COVERAGE_HEADINGS) % COVERAGE_HEADINGS;
-    double seconds = COVERAGE_EIGHTH / c->options.turn_rad_s;
+    double seconds = NAV_PI / 4.0 / c->options.turn_rad_s;
     next.seconds += (float)(seconds + (coverage_turned(c, state) ? 0.0 : c->options.begin_s));
     next.from = state;
     coverage_reach(c, cell * COVERAGE_HEADINGS + heading, next);
@@ -174,7 +175,7 @@ static bool coverage_begin(struct nav_coverage *c, double x, double y, double tu
     if (!(column >= 0.0 && column < g->columns && row >= 0.0 && row < g->rows && isfinite(turn)))
         return false;
     for (int heading = 0; heading < COVERAGE_HEADINGS; heading++) {
-        double angle = fabs(remainder(heading * COVERAGE_EIGHTH - turn, COVERAGE_CIRCLE));
+        double angle = fabs(remainder(heading * (NAV_PI / 4.0) - turn, 2.0 * NAV_PI));
         double begin = angle > COVERAGE_STRAIGHT_RAD ? c->options.begin_s : 0.0;
         int state = ((int)row * g->columns + (int)column) * COVERAGE_HEADINGS + heading;
         coverage_reach(c, state,

@@ -13,7 +13,8 @@ static struct nav_contact settled(void)
 {
     struct nav_contact c;
     nav_contact_init(&c, &CONFIG);
-    nav_contact_rest(&c, 1000.0, 2000.0);
+    for (int i = 0; i < CONFIG.settle_samples; i++)
+        nav_contact_update(&c, 1000.0, 2000.0, true);
     return c;
 }
 
@@ -104,11 +105,11 @@ static struct ramp pilots(void)
                                                      .release_counts = 65.0,
                                                      .onset_samples = 3,
                                                      .release_samples = 12,
-                                                     .settle_samples = 0,
+                                                     .settle_samples = 1,
                                                      .rest_samples = 40000.0};
     struct ramp r = {.noise = 1};
     nav_contact_init(&r.c, &config);
-    nav_contact_rest(&r.c, 0.0, 0.0);
+    nav_contact_update(&r.c, 0.0, 0.0, true);
     return r;
 }
 

@@ -11,13 +11,6 @@ void nav_contact_init(struct nav_contact *c, const struct nav_contact_config *co
     *c = (struct nav_contact){.config = *config};
 }
 
-void nav_contact_rest(struct nav_contact *c, double alpha, double beta)
-{
-    c->rest[0] = alpha;
-    c->rest[1] = beta;
-    c->settled = c->config.settle_samples;
-}
-
 static void contact_settle(struct nav_contact *c, double alpha, double beta)
 {
     c->settled++;

@@ -17,7 +17,7 @@ struct nav_contact_config {
     double release_counts; /* ... and ends when it stays below this; release_counts < onset_counts */
     int onset_samples;     /* for so many good samples in a row, at least 1 */
     int release_samples;   /* whiskers ring after release (16-60 Hz, whisker_physics section 5): a period is safe */
-    int settle_samples;    /* the rest is the mean of so many first good samples; 0: set by nav_contact_rest */
+    int settle_samples;    /* the rest is the mean of so many first good samples */
     double
         rest_samples; /* time constant, in samples, with which the rest follows drift while nothing touches; what
                          stays between both thresholds for a fortieth of it is faster drift: no contact, or its end */
@@ -38,9 +38,6 @@ struct nav_contact {
 };
 
 void nav_contact_init(struct nav_contact *, const struct nav_contact_config *);
-
-/* Sets the rest, counts, and ends settling. */
-void nav_contact_rest(struct nav_contact *, double alpha, double beta);
 
 /* Takes one sample. A sample that is not good or not finite is skipped and counted: it neither begins, keeps nor ends
  * a contact. On a release `peak` holds the contact's peak. */
