@@ -1,5 +1,5 @@
-"""Fields of a parsed model file, each with its type and range: what is taken is as it should be, or a ValueError says
-which field is not."""
+"""Fields of a parsed file, each with its type and range: what is taken is as it should be, or an error says which field is
+not. The one place that judges what a JSON, YAML or TOML file holds (TOML with its lines: scene_table)."""
 
 import math
 from typing import Any
@@ -7,65 +7,82 @@ from typing import Any
 import numpy as np
 
 HUGE = 1e12  # of numbers that have no bound of their own: far beyond any, and no sum of squares of them is infinite
-TEXT_MOST = 40  # characters of a wrong value that are shown
+SHOWN_MOST = 60  # characters of a wrong value that are shown
 
 
 class Fields:
-    """The fields of one JSON object; `place` says where it lies in the file."""
+    """The fields of one object; `place` says where it lies in the file."""
 
     def __init__(self, content: Any, place: str = ""):
         if not isinstance(content, dict):
             raise ValueError(f"{place or 'the file'}: no object with fields")
-        self._content, self._place = content, place
+        self.content, self._place = content, place
+
+    def fail(self, name: str, text: str) -> ValueError:
+        """The error of a field, whose name `text` goes on behind."""
+        return ValueError(f"field '{self._path(name)}' {text}")
 
     def has(self, name: str) -> bool:
         """Whether the field is there and not null."""
-        return self._content.get(name) is not None
+        return self.content.get(name) is not None
 
     def take(self, name: str) -> Any:
-        if name not in self._content:
-            raise ValueError(f"field '{self._path(name)}' is missing")
-        return self._content[name]
+        if name not in self.content:
+            raise self.fail(name, "is missing")
+        return self.content[name]
 
     def number(self, name: str, low: float = -HUGE, high: float = HUGE) -> float:
+        return self._within(name, self.take(name), low, high, "a number")
+
+    def numbers(self, name: str, count: int, low: float, high: float) -> tuple[float, ...]:
         value = self.take(name)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise self._wrong(name, f"a number from {low:g} to {high:g}")
-        return float(value)
+        if not isinstance(value, list) or len(value) != count:
+            raise self.fail(name, f"must be a list of {count} numbers")
+        return tuple(self._within(name, item, low, high, "numbers") for item in value)
 
     def whole(self, name: str, low: int, high: int) -> int:
         value = self.take(name)
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise self._wrong(name, f"a whole number from {low} to {high}")
+        if type(value) is not int or not low <= value <= high:
+            raise self.fail(name, f"must be a whole number from {low} to {high}, not {_shown(value)}")
         return value
 
     def flag(self, name: str) -> bool:
-        if not isinstance(self.take(name), bool):
-            raise self._wrong(name, "true or false")
-        return self.take(name)
+        value = self.take(name)
+        if not isinstance(value, bool):
+            raise self.fail(name, f"must be true or false, not {_shown(value)}")
+        return value
 
     def text(self, name: str, *allowed: str) -> str:
-        if self.take(name) not in allowed:
-            raise self._wrong(name, " or ".join(f"'{text}'" for text in allowed))
-        return self.take(name)
+        """One of those that are allowed; if none is named, any that is not empty."""
+        value = self.take(name)
+        if not isinstance(value, str) or not value or (allowed and value not in allowed):
+            raise self.fail(name, f"must be {' or '.join(map(repr, allowed)) or 'a string'}, not {_shown(value)}")
+        return value
+
+    def strings(self, name: str) -> tuple[str, ...]:
+        value = self.take(name)
+        if not isinstance(value, list) or not value or not all(isinstance(item, str) and item for item in value):
+            raise self.fail(name, 'must be a list of strings, as in ["A", "B"]')
+        return tuple(value)
 
     def names(self, name: str, most: int) -> list[str]:
         """One to `most` different texts."""
-        value = self.take(name)
-        texts = isinstance(value, list) and all(isinstance(item, str) and item for item in value)
-        if not texts or not 1 <= len(set(value)) == len(value) <= most:
-            raise self._wrong(name, f"1 to {most} different names")
-        return value
+        value = self.strings(name)
+        if not len(set(value)) == len(value) <= most:
+            raise self.fail(name, f"must be 1 to {most} different names")
+        return list(value)
 
     def array(self, name: str, dimensions: int, low: float = -HUGE, high: float = HUGE) -> np.ndarray:
         """Nested lists of numbers, all in the range; an empty list has whatever dimensions are wanted."""
+        value = self.take(name)
         try:
-            array = np.array(self.take(name))
+            array = np.array(value)
         except (ValueError, RecursionError):  # ragged
             array = np.array(None)
         numbers = array.dtype.kind in "iuf" and array.ndim == (dimensions if array.size else 1)
         if not numbers or not ((low <= array) & (array <= high)).all():
-            raise self._wrong(name, f"numbers from {low:g} to {high:g} in lists of depth {dimensions}")
+            wanted = f"numbers from {low:g} to {high:g} in lists of depth {dimensions}"
+            raise self.fail(name, f"must be {wanted}, not {_shown(value)}")
         return array.astype(np.float64)
 
     def part(self, name: str) -> "Fields":
@@ -74,18 +91,21 @@ class Fields:
     def parts(self, name: str, most: int) -> "list[Fields]":
         value = self.take(name)
         if not isinstance(value, list) or not 1 <= len(value) <= most:
-            raise self._wrong(name, f"a list of 1 to {most}")
+            raise self.fail(name, f"must be a list of 1 to {most}")
         return [Fields(item, f"{self._path(name)}[{n}]") for n, item in enumerate(value)]
 
-    def _wrong(self, name: str, wanted: str) -> ValueError:
-        value = self.take(name)
-        shown = repr(value) if isinstance(value, str | float | bool | None) or _short(value) else type(value).__name__
-        return ValueError(f"field '{self._path(name)}' is {shown[:TEXT_MOST]}; it must be {wanted}")
+    def _within(self, name: str, value: Any, low: float, high: float, wanted: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise self.fail(name, f"must be {wanted} from {low:g} to {high:g}, not {_shown(value)}")
+        return float(value)
 
     def _path(self, name: str) -> str:
         return f"{self._place}.{name}" if self._place else name
 
 
-def _short(value) -> bool:
-    """Whether it may be printed: an integer of thousands of digits may not."""
-    return isinstance(value, int) and math.log2(abs(value) + 1) < 64
+def _shown(value: Any) -> str:
+    """A wrong value, shortened; of lists and objects the kind. An integer of thousands of digits cannot be printed."""
+    if isinstance(value, int) and math.log2(abs(value) + 1) >= 64:
+        return "a number of many digits"
+    text = type(value).__name__ if isinstance(value, list | dict) else repr(value)
+    return text if len(text) <= SHOWN_MOST else f"{text[:SHOWN_MOST]}..."

@@ -246,7 +246,7 @@ def _arena(table: Table) -> Arena:
 
 def _surface(table: Table, key: str) -> str:
     """The texture of a face that this key names; empty without the key."""
-    name = table.string(key) if key in table.content else ""
+    name = table.text(key) if key in table.content else ""
     if name and not re.fullmatch(r"\w+", name):
         raise table.fail(key, f"has the name '{name}'; use letters, digits and underscores")
     return name
@@ -303,7 +303,7 @@ def _floor(table: Table, size, tile: float, textures) -> tuple[str, ...]:
 def _floor_image(table: Table, textures) -> tuple[str, ...]:
     """A tile for each pixel, its texture by the nearest of evenly spaced grey levels, the first texture black; a pixel
     that can be looked through is not known."""
-    path = table.path.parent / table.string("floor")
+    path = table.path.parent / table.text("floor")
     try:
         grey = read_grey(path)
     except UnreadableError as error:
@@ -334,7 +334,7 @@ def _robot(table: Table, size_m: tuple[float, float]) -> Robot:
 
 def _whisker(entry: Table) -> Whisker:
     name = entry.name()
-    role = entry.string("role", ("texture", "object"))
+    role = entry.text("role", "texture", "object")
     if role == "texture":
         whisker = Whisker(name, role, tip_m=entry.numbers("tip_m", 2, -LARGEST_M, LARGEST_M))
     else:
@@ -350,7 +350,7 @@ def _whisker(entry: Table) -> Whisker:
 
 
 def _prior(table: Table) -> Prior:
-    kind = table.string("kind", ("gaussian", "uniform"))
+    kind = table.text("kind", "gaussian", "uniform")
     if kind == "uniform":
         table.done()
         return Prior(kind)

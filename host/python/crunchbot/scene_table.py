@@ -5,21 +5,22 @@ from pathlib import Path
 from typing import Any
 
 from .errors import UserError
+from .fields import Fields
 from .files import UnreadableError, read_toml
 
 LARGEST_M = 1000.0
-SHOWN_MOST = 60  # characters of a wrong value
 
 
 class SceneError(UserError, ValueError):
     """A scene that is not as docs/formats.md has it. Its text is one line: file, line or key, what and the remedy."""
 
 
-class Table:
-    """One TOML table with strict accessors: what is taken is checked, what is left over is an error."""
+class Table(Fields):
+    """One TOML table: what is taken is checked, what is left over is an error."""
 
     def __init__(self, path: Path, source: str, content: dict, header: str | None = None, nth: int = 0):
-        self.path, self.source, self.content, self.header, self.nth = path, source, dict(content), header, nth
+        super().__init__(dict(content))
+        self.path, self.source, self.header, self.nth = path, source, header, nth
 
     @classmethod
     def read(cls, path: Path) -> "Table":
@@ -40,30 +41,9 @@ class Table:
             )
         return self.content.pop(key)
 
-    def number(self, key: str, low: float, high: float) -> float:
-        return self._checked(key, self.take(key), low, high)
-
-    def numbers(self, key: str, count: int, low: float, high: float) -> tuple[float, ...]:
-        value = self.take(key)
-        if not isinstance(value, list) or len(value) != count:
-            raise self.fail(key, f"must be a list of {count} numbers")
-        return tuple(self._checked(key, item, low, high) for item in value)
-
-    def strings(self, key: str) -> tuple[str, ...]:
-        value = self.take(key)
-        if not isinstance(value, list) or not value or not all(isinstance(item, str) and item for item in value):
-            raise self.fail(key, 'must be a list of strings, as in ["A", "B"]')
-        return tuple(value)
-
-    def string(self, key: str, allowed: tuple[str, ...] | None = None) -> str:
-        value = self.take(key)
-        if not isinstance(value, str) or not value or (allowed and value not in allowed):
-            raise self.fail(key, f"must be {' or '.join(map(repr, allowed)) if allowed else 'a string'}")
-        return value
-
     def name(self) -> str:
         """The key `name`: letters, digits and underscores."""
-        name = self.string("name")
+        name = self.text("name")
         if not re.fullmatch(r"\w+", name):
             raise self.fail("name", f"is '{name}'; use letters, digits and underscores")
         return name
@@ -81,11 +61,6 @@ class Table:
         for key in self.content:
             raise self.fail(key, "is unknown; remove it")
 
-    def _checked(self, key: str, value, low: float, high: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise self.fail(key, f"must be numbers from {low:g} to {high:g}, not {_shown(value)}")
-        return float(value)
-
     def _line_of(self, key: str) -> int | None:
         """Line of `key` in this table: after the nth header, if it has one."""
         lines = list(enumerate(self.source.splitlines(), start=1))
@@ -97,9 +72,3 @@ class Table:
             lines = lines[heads[self.nth] - 1 : end - 1]
         wanted = re.compile(rf"\s*(\[+\s*)?[\"']?{re.escape(key)}[\"']?\s*[=\].]")
         return next((n for n, text in lines if wanted.match(text)), lines[0][0] if self.header else None)
-
-
-def _shown(value) -> str:
-    """A wrong value, shortened; an integer of thousands of digits cannot be printed."""
-    text = repr(value) if not isinstance(value, int) or abs(value) < 1 << 64 else "a number of many digits"
-    return text if len(text) <= SHOWN_MOST else f"{text[:SHOWN_MOST]}..."

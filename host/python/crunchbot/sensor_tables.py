@@ -45,8 +45,8 @@ def _read(entry: Table, size_m: tuple[float, float]) -> SensorTable:
     at_m = entry.numbers("at_m", 2, -LARGEST_M, LARGEST_M)
     reported = [entry.number(k, 0.0, LARGEST_M) if k in entry.content else 0.0 for k in ("spacing_m", "detail_m")]
     folder = entry.path.parent
-    edges, likelihood = _read_table(folder / entry.string("table"))
-    image = folder / entry.string("map")
+    edges, likelihood = _read_table(folder / entry.text("table"))
+    image = folder / entry.text("map")
     try:
         grey = read_grey(image)
     except UnreadableError as error:

@@ -69,7 +69,7 @@ def test_a_gyroscope_may_be_stated(folder, tmp_path):
     scenes.write(tmp_path / "again", scene)
     assert scenes.load(tmp_path / "again") == scene
     (folder / "robot.toml").write_text(text.replace("0.0035", "0"))
-    with pytest.raises(scenes.SceneError, match="line 3: 'odometry_turn_sigma_rad' must be numbers"):
+    with pytest.raises(scenes.SceneError, match="line 3: 'odometry_turn_sigma_rad' must be a number"):
         scenes.load(folder)
 
 
@@ -127,9 +127,9 @@ def test_a_body_that_leans_against_a_wall_or_a_block_is_free(folder):
 BROKEN = [
     ("arena.toml", "size_m = [1.0, 1.5]", "size_m = [0.0, 1.5]", "line 1: 'size_m' must be numbers from"),
     ("arena.toml", "size_m = [1.0, 1.5]", "size_m = [1.0]", "line 1: 'size_m' must be a list of 2"),
-    ("arena.toml", "tile_m = 0.5", 'tile_m = "wide"', "line 2: 'tile_m' must be numbers"),
-    ("arena.toml", "tile_m = 0.5", "tile_m = nan", "line 2: 'tile_m' must be numbers"),
-    ("arena.toml", "tile_m = 0.5", "tile_m = true", "line 2: 'tile_m' must be numbers"),
+    ("arena.toml", "tile_m = 0.5", 'tile_m = "wide"', "line 2: 'tile_m' must be a number"),
+    ("arena.toml", "tile_m = 0.5", "tile_m = nan", "line 2: 'tile_m' must be a number"),
+    ("arena.toml", "tile_m = 0.5", "tile_m = true", "line 2: 'tile_m' must be a number"),
     ("arena.toml", "tile_m = 0.5", "tile_m = 0.5\ncolour = 1", "line 3: 'colour' is unknown; remove it"),
     ("arena.toml", "tile_m = 0.5\n", "", "'tile_m' is missing; add it"),
     ("arena.toml", '"SMOOTH"', '"VELVET"', "line 3: 'textures' has two names that begin with 'V'"),
@@ -150,12 +150,12 @@ BROKEN = [
     ("arena.toml", "max_m = [0.7", "most_m = [0.7", "'max_m' is missing in [[obstacle]] number 2"),
     ("arena.toml", "[[obstacle]]\nmin_m = [0.0, 0.0]\nmax_m = [0.2, 0.3]", "obstacle = 3", "not TOML"),
     ("arena.toml", "tile_m = 0.5", "tile_m 0.5", "not TOML"),
-    ("robot.toml", "radial_sigma_m = 0.005", "radial_sigma_m = 0.0", "line 3: 'radial_sigma_m' must be numbers"),
+    ("robot.toml", "radial_sigma_m = 0.005", "radial_sigma_m = 0.0", "line 3: 'radial_sigma_m' must be a number"),
     ("robot.toml", 'role = "texture"', 'role = "nose"', "line 7: 'role' must be 'texture' or 'object'"),
     ("robot.toml", 'name = "front"', 'name = "floor_left"', "'whisker' has the name 'floor_left' twice"),
     ("robot.toml", 'name = "front"', 'name = "front left"', "line 11: 'name' is 'front left'"),
     ("robot.toml", "length_m = 0.14", "length_m = 0.14\ntip_m = [0, 0]", "line 16: 'tip_m' is unknown"),
-    ("robot.toml", "length_m = 0.14", "length_m = -0.14", "line 15: 'length_m' must be numbers"),
+    ("robot.toml", "length_m = 0.14", "length_m = -0.14", "line 15: 'length_m' must be a number"),
     ("robot.toml", "tip_m = [0.1, 0.2]", "", "'tip_m' is missing in [[whisker]] number 1"),
     ("prior.toml", 'kind = "gaussian"', 'kind = "sharp"', "line 1: 'kind' must be 'gaussian' or 'uniform'"),
     ("prior.toml", "0.1, 0.2, 0.3", "0.1, 0.0, 0.3", "line 3: 'sigma' must be numbers"),

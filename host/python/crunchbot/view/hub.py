@@ -3,6 +3,7 @@
 import asyncio
 import time
 
+from ..fields import Fields
 from ..scene import LARGEST_M, Scene
 from .rings import find_rings
 from .robot import RobotModel
@@ -77,13 +78,14 @@ class Hub:
         """Tell the robot's navigator the pose that a page asks for. RequestError: it is none, or it may not."""
         if not self.may_set_pose:
             raise RequestError("set_pose: not allowed here; start whisker-view with --robot and --allow-pose")
-        pose = tuple(request.get(name) for name in ("x", "y", "theta"))
-        if any(type(value) not in (int, float) or not abs(value) <= LARGEST_M for value in pose):
-            raise RequestError(f"set_pose: x, y and theta are not numbers within {LARGEST_M:g}")
+        try:
+            pose = tuple(Fields(request).number(name, -LARGEST_M, LARGEST_M) for name in ("x", "y", "theta"))
+        except ValueError as error:
+            raise RequestError(f"set_pose: {error}") from None
         arena = self.robot.scene and self.robot.scene.arena
         if arena and not (0.0 <= pose[0] <= arena.size_m[0] and 0.0 <= pose[1] <= arena.size_m[1]):
             raise RequestError("set_pose: outside the arena; point at a place inside")
-        self.source.set_pose(tuple(map(float, pose)))
+        self.source.set_pose(pose)
 
     def play(self, request: dict) -> None:
         """Play the recording as a page asks for. RequestError: it asks for something else, or there is none."""
@@ -91,14 +93,13 @@ class Hub:
         if not playback:
             raise RequestError("play: no recording is played; start whisker-view with FILE.mcap")
         limits = {"speed": (SPEED_LEAST, SPEED_MOST), "at_s": (0.0, playback["length_s"])}
-        asked = {name: request[name] for name in ("playing", *limits) if request.get(name) is not None}
-        if type(asked.get("playing", True)) is not bool:
-            raise RequestError("play: playing is neither true nor false")
-        for name, (low, high) in limits.items():
-            value = asked.get(name, low)
-            if type(value) not in (int, float) or not low <= value <= high:
-                raise RequestError(f"play: {name} is not a number from {low:g} to {high:g}")
-        self.source.play(**asked)
+        asked = Fields(request)
+        try:
+            wanted = {name: asked.number(name, *bounds) for name, bounds in limits.items() if asked.has(name)}
+            wanted |= {"playing": asked.flag("playing")} if asked.has("playing") else {}
+        except ValueError as error:
+            raise RequestError(f"play: {error}") from None
+        self.source.play(**wanted)
 
     async def next_round(self) -> None:
         """Waits until the rings have been read once more."""

@@ -282,9 +282,9 @@ def test_a_page_is_reported_of_unknown_ground_and_not_of_tables():
     [
         (True, {"x": 0.3, "y": 2, "theta": -1.5}, ""),
         (True, {"x": 2.6, "y": 2, "theta": 0}, "set_pose: outside the arena"),
-        (True, {"x": "1", "y": 2, "theta": 0}, "set_pose: x, y and theta are not numbers"),
-        (True, {"x": True, "y": 2, "theta": 0}, "set_pose: x, y and theta are not numbers"),
-        (True, {"x": 1, "y": 2}, "set_pose: x, y and theta are not numbers"),
+        (True, {"x": "1", "y": 2, "theta": 0}, "set_pose: field 'x' must be a number from -1000 to 1000, not '1'"),
+        (True, {"x": True, "y": 2, "theta": 0}, "set_pose: field 'x' must be a number"),
+        (True, {"x": 1, "y": 2}, "set_pose: field 'theta' is missing"),
         (False, {"x": 0.3, "y": 2, "theta": -1.5}, "set_pose: not allowed here"),
     ],
 )
