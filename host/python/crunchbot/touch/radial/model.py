@@ -2,7 +2,7 @@
 the places left out; calibration recordings and model files."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -124,13 +124,22 @@ class Whisks:
     bad_rows: int  # rows with a cell that is no finite number: left out
     node: int | None = None  # serial number of the node whose whisker it is, where the file states it
     direction_deg: np.ndarray | None = None  # of the touch about the shaft, where the file states it
+    known_shapes: dict[str, Any] = field(default_factory=dict, repr=False)  # by contact; parts share them
 
     def part(self, use: ArrayLike) -> "Whisks":
         """Only the contacts of these indices."""
         arrays = (None if a is None else a[use] for a in (self.peak_counts, self.radius_mm))
         directions = None if self.direction_deg is None else self.direction_deg[use]
         named = [self.contact[n] for n in use], [self.recorded[n] for n in use]
-        return Whisks(*named, *arrays, self.bad_rows, self.node, directions)
+        return Whisks(*named, *arrays, self.bad_rows, self.node, directions, self.known_shapes)
+
+    @property
+    def shapes(self) -> list:
+        """struct nav_shape of each contact; a fit with contacts left out asks for the same ones again and again."""
+        for name, contact in zip(self.contact, self.recorded, strict=True):
+            if name not in self.known_shapes:
+                self.known_shapes[name] = shape_of(contact)
+        return [self.known_shapes[name] for name in self.contact]
 
     @property
     def axes(self) -> int:
@@ -239,7 +248,7 @@ def _model_of(whisks: Whisks, name: str):
         return CurveModel.fit(name, whisks.peak_counts, whisks.radius_mm)
     if name == "press":
         return PressModel.fit(whisks.recorded, whisks.radius_mm, whisks.direction_deg)
-    return WhiskModel.fit([shape_of(contact) for contact in whisks.recorded], whisks.radius_mm, whisks.axes)
+    return WhiskModel.fit(whisks.shapes, whisks.radius_mm, whisks.axes)
 
 
 def _left_out_errors(whisks: Whisks, name: str, model) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from itertools import zip_longest
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from .change import fit_change
 from .fit import Fitted, Windows, fit
@@ -142,8 +143,8 @@ def _outstanding(x: np.ndarray) -> np.ndarray:
 def _widest(parts: list, length: int) -> np.ndarray:
     """Farthest from lowest to highest sample of any window, by channel."""
     hop = max(1, length // 4)
-    spans = [np.ptp(p[i : i + length], axis=0) for p in parts for i in range(0, len(p) - length + 1, hop)]
-    return np.maximum(np.max(spans, axis=0), 1.0)
+    windows = (sliding_window_view(p, length, axis=0)[::hop] for p in parts if len(p) >= length)
+    return np.maximum(np.max([np.ptp(each, axis=-1).max(axis=0) for each in windows], axis=0), 1.0)
 
 
 def _calibrate(model: SpectralModel, fitted: list[Fitted], parts: list, labels, folds, base: int) -> None:
