@@ -13,12 +13,6 @@ static bool node_storm_is_sound(const struct storm_counts *c)
            c->stuck == 0 && c->violations == 0;
 }
 
-static void node_storm_write_class(bool first, const char *name, const struct storm_class *c)
-{
-    printf("%s\"%s\": [%" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %.9g, %.9g]", first ? "" : ", ", name, c->events,
-           c->passed, c->good, c->expected_passed, c->expected_good);
-}
-
 static void node_storm_write_line(unsigned long long batch, const struct storm_counts *c)
 {
 #define FIELD(name) printf("\"" #name "\": %" PRIu64 ", ", c->name);
@@ -34,18 +28,8 @@ static void node_storm_write_line(unsigned long long batch, const struct storm_c
     FIELD(spurious)
     FIELD(stuck)
     FIELD(violations)
-    FIELD(overwritten)
 #undef FIELD
-    printf("\"injected\": {");
-    for (unsigned k = 0; k < STORM_KIND_COUNT; k++)
-        printf("%s\"%s\": %" PRIu64, k ? ", " : "", storm_kind_name((enum storm_kind)k), c->injected[k]);
-    printf("}, \"lines\": {");
-    for (unsigned k = 0; k < STORM_LINE_COUNT; k++)
-        node_storm_write_class(k == 0, storm_line_name((enum storm_line)k), &c->lines[k]);
-    printf("}, \"links\": {");
-    for (unsigned k = 0; k < STORM_LINK_COUNT; k++)
-        node_storm_write_class(k == 0, storm_link_name((enum storm_link)k), &c->links[k]);
-    printf("}}\n");
+    printf("\"overwritten\": %" PRIu64 "}\n", c->overwritten);
     fflush(stdout);
 }
 

@@ -35,47 +35,19 @@ enum storm_kind { STORM_KINDS(STORM_NAME) STORM_KIND_COUNT };
 enum { STORM_SCHEDULES = 1000 }; /* of a batch, all on one node */
 
 /* Frames of the sensor that were hurt: by the first kinds above, or as what a lost or doubled clock leaves behind. */
-#define STORM_LINES(X)                                                                                                 \
-    X(FLIP_BIT)                                                                                                        \
-    X(FLIP_TWO)                                                                                                        \
-    X(NOISY)                                                                                                           \
-    X(FLOATING)                                                                                                        \
-    X(DEAD)                                                                                                            \
-    X(STUCK_LOW)                                                                                                       \
-    X(ERROR_BITS)                                                                                                      \
-    X(LOST_CLOCK)                                                                                                      \
-    X(EXTRA_CLOCK)                                                                                                     \
-    X(BEHIND) /* the sensor began one bit late */                                                                      \
-    X(AHEAD)  /* one bit early */                                                                                      \
-    X(OTHER)  /* supplies, resets, more than one of these */
-/* Good records hurt on their way to the bridge. */
-#define STORM_LINKS(X)                                                                                                 \
-    X(FLIPS_1)                                                                                                         \
-    X(FLIPS_2)                                                                                                         \
-    X(FLIPS_3)                                                                                                         \
-    X(FLIPS_4)                                                                                                         \
-    X(FLIPS_5)                                                                                                         \
-    X(FLIPS_6)                                                                                                         \
-    X(FLIPS_7)                                                                                                         \
-    X(FLIPS_8)                                                                                                         \
-    X(CUT)     /* clocks missing at its end */                                                                         \
-    X(GLITCH)  /* of select */                                                                                         \
-    X(REARMED) /* another record took its place amid the transfer, which came at a wrong time */
-
-#define LINE_NAME(name) STORM_LINE_##name,
-enum storm_line { STORM_LINES(LINE_NAME) STORM_LINE_COUNT };
-#undef LINE_NAME
-#define LINK_NAME(name) STORM_LINK_##name,
-enum storm_link { STORM_LINKS(LINK_NAME) STORM_LINK_COUNT };
-#undef LINK_NAME
-
-/* Of one class of damage. Expected: the sum over the events of the probability, worked out from the bytes that were
- * sent and over all places where the fault might have struck; 0 where it is not worked out. */
-struct storm_class {
-    uint64_t events;
-    uint64_t passed; /* a line's: start byte, error word and sum fit; a link's: CRC and tick fit. Yet bits were hurt */
-    uint64_t good;   /* and it was a good sample to the end */
-    double expected_passed, expected_good;
+enum storm_line {
+    STORM_LINE_FLIP_BIT,
+    STORM_LINE_FLIP_TWO,
+    STORM_LINE_NOISY,
+    STORM_LINE_FLOATING,
+    STORM_LINE_DEAD,
+    STORM_LINE_STUCK_LOW,
+    STORM_LINE_ERROR_BITS,
+    STORM_LINE_LOST_CLOCK,
+    STORM_LINE_EXTRA_CLOCK,
+    STORM_LINE_BEHIND, /* the sensor began one bit late */
+    STORM_LINE_AHEAD,  /* one bit early */
+    STORM_LINE_OTHER   /* supplies, resets, more than one of these */
 };
 
 struct storm_counts {
@@ -90,15 +62,9 @@ struct storm_counts {
     uint64_t stuck;       /* not good again within STORM_PATIENCE ticks: the batch ends */
     uint64_t violations;  /* of the sensor's or the chip's data sheet */
     uint64_t overwritten; /* words that arming displaced amid a transfer at a wrong time; any others are violations */
-    uint64_t injected[STORM_KIND_COUNT];
-    struct storm_class lines[STORM_LINE_COUNT], links[STORM_LINK_COUNT];
 };
 
 enum { STORM_PATIENCE = 700 };
-
-const char *storm_kind_name(enum storm_kind kind);
-const char *storm_line_name(enum storm_line line);
-const char *storm_link_name(enum storm_link link);
 
 /* Batch `seed`: the same counts each time. */
 struct storm_counts storm_batch(uint64_t seed);

@@ -10,28 +10,6 @@ enum { SETTLED = 3, MOST_FAULTS = 3, SPREAD = 4 };
 static const unsigned WEIGHTS[] = {STORM_KINDS(WEIGHT)};
 #undef WEIGHT
 
-const char *storm_kind_name(enum storm_kind kind)
-{
-#define NAME(name, weight) #name,
-    static const char *const NAMES[] = {STORM_KINDS(NAME)};
-#undef NAME
-    return NAMES[kind];
-}
-
-#define NAME(name) #name,
-const char *storm_line_name(enum storm_line line)
-{
-    static const char *const NAMES[] = {STORM_LINES(NAME)};
-    return NAMES[line];
-}
-
-const char *storm_link_name(enum storm_link link)
-{
-    static const char *const NAMES[] = {STORM_LINKS(NAME)};
-    return NAMES[link];
-}
-#undef NAME
-
 struct storm {
     struct storm_log log;
     struct lane_bench bench;

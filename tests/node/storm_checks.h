@@ -1,5 +1,5 @@
-/* The checks of node and bridge once more, distinguished from their own code, on bits: what passes them by arithmetic,
- * and how likely that is. Frames and records are 64 bits, the first one highest. */
+/* The checks of node and bridge once more, distinguished from their own code, on bits: what passes them by arithmetic.
+ * Frames and records are 64 bits, the first one highest. */
 #ifndef STORM_CHECKS_H
 #define STORM_CHECKS_H
 
@@ -27,14 +27,5 @@ uint64_t checks_mask(unsigned place); /* the bit at this place, 0 the first */
 
 /* And of a record whose last `missing` clocks do not come: the level stays. */
 uint64_t checks_cut(uint64_t record, unsigned missing);
-
-struct checks_odds {
-    double passed, good; /* of 1; good only where all places are gone through */
-};
-struct checks_odds checks_odds_two(const struct sim_node_frame *frame);
-struct checks_odds checks_odds_lost(const struct sim_node_frame *frame, bool held);
-struct checks_odds checks_odds_extra(const struct sim_node_frame *frame);
-struct checks_odds checks_odds_noise(const struct sim_node_frame *frame, double each); /* good: not worked out */
-struct checks_odds checks_odds_cut(uint64_t record);                                   /* 1 to 64 clocks */
 
 #endif

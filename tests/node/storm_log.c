@@ -33,7 +33,6 @@ void storm_log_deed(struct storm_log *log, bool any, enum storm_kind kind, const
         .stray = faults->second_sync_ns > 0 || (log->deeds[BEFORE].stray && storm_log_loses_order(faults)),
         .ill = log->ill,
     };
-    log->counts.injected[kind] += any;
 }
 
 static bool storm_log_breaks_line(const struct storm_deed *deed)
@@ -90,32 +89,6 @@ static bool storm_log_is_foreseen(enum storm_line line, const struct lane_faults
     }
 }
 
-static struct checks_odds storm_log_odds_of(enum storm_line line, const struct lane_faults *faults,
-                                            const struct sim_node_frame *frame, bool held)
-{
-    switch (line) {
-    case STORM_LINE_FLIP_TWO:
-        return checks_odds_two(frame);
-    case STORM_LINE_NOISY:
-        return checks_odds_noise(frame, faults->sensor_argument / 65536.0);
-    case STORM_LINE_LOST_CLOCK:
-        return checks_odds_lost(frame, held);
-    case STORM_LINE_EXTRA_CLOCK:
-        return checks_odds_extra(frame);
-    default:
-        return (struct checks_odds){0};
-    }
-}
-
-static void storm_log_count(struct storm_class *class, bool passed, bool good, struct checks_odds odds)
-{
-    class->events++;
-    class->passed += passed;
-    class->good += good;
-    class->expected_passed += odds.passed;
-    class->expected_good += odds.good;
-}
-
 /* That of the tick in which the frame began. */
 static const struct storm_deed *storm_log_deed_of(const struct storm_log *log, const struct lane_verdict *v)
 {
@@ -128,18 +101,12 @@ static bool log_frame(struct storm_log *log, const struct lane_verdict *v)
 {
     const struct sim_node_frame *frame = &v->report.frame;
     const struct storm_deed *deed = storm_log_deed_of(log, v);
-    const bool hurt = frame->line != frame->sent, passed = hurt && checks_pass_line(frame->line);
-    const bool struck = storm_log_breaks_line(deed) || frame->slip != 0,
-               held = !frame->followed || (log->line & 1u) != 0;
-    const enum storm_line line = storm_log_line_of(deed, frame);
-    log->line = frame->line;
+    const bool hurt = frame->line != frame->sent, struck = storm_log_breaks_line(deed) || frame->slip != 0;
     if (!struck && !deed->ill)
         log->counts.unforeseen += hurt;
     if (!struck && !hurt)
         return false;
-    log->counts.unforeseen += !storm_log_is_foreseen(line, &deed->faults, frame);
-    storm_log_count(&log->counts.lines[line], passed, passed && checks_pass_step(frame, frame->line),
-                    storm_log_odds_of(line, &deed->faults, frame, held));
+    log->counts.unforeseen += !storm_log_is_foreseen(storm_log_line_of(deed, frame), &deed->faults, frame);
     return hurt;
 }
 
@@ -178,30 +145,6 @@ static bool storm_log_link_is_foreseen(const struct storm_log *log, const struct
         return v->read == ~UINT64_C(0);
     return v->read ==
            (f->extra_clocks < 0 ? checks_cut(v->armed, (unsigned)-f->extra_clocks) : v->armed ^ f->miso_flips);
-}
-
-static void log_transfer(struct storm_log *log, const struct lane_verdict *v, uint8_t expected)
-{
-    const struct storm_deed *deed = &log->deeds[NOW];
-    const struct lane_faults *f = &deed->faults;
-    const bool whole = checks_pass_record(v->armed, expected) && (v->armed >> 8 & 0xFFFFu) == 0;
-    const bool passed = v->read != v->armed && v->read != ~UINT64_C(0) && checks_pass_record(v->read, expected);
-    struct checks_odds odds = {0};
-    enum storm_link link;
-    log->counts.unforeseen += !storm_log_link_is_foreseen(log, v, expected);
-    if (deed->ill || !whole || !(storm_log_breaks_link(f) || v->rearmed) || f->no_select || f->miso_stuck)
-        return;
-    if (f->glitch_bit > 0)
-        link = STORM_LINK_GLITCH;
-    else if (v->rearmed)
-        link = STORM_LINK_REARMED;
-    else if (f->extra_clocks < 0)
-        link = STORM_LINK_CUT;
-    else
-        link = (enum storm_link)(STORM_LINK_FLIPS_1 + __builtin_popcountll(f->miso_flips) - 1);
-    if (link == STORM_LINK_CUT)
-        odds = checks_odds_cut(v->armed);
-    storm_log_count(&log->counts.links[link], passed, passed && v->good, odds);
 }
 
 /* ----------------------------------------------------------------------------------------------------- good records */
@@ -260,7 +203,7 @@ bool storm_log_verdict(struct storm_log *log, unsigned tick, const struct lane_v
     const bool is_new = v->report.frame.number != log->frame;
     const bool line_hurt = is_new && log_frame(log, v);
     log->frame = v->report.frame.number;
-    log_transfer(log, v, expected);
+    log->counts.unforeseen += !storm_log_link_is_foreseen(log, v, expected);
     log_overwritten(log, v);
     log->counts.ticks++;
     log->counts.bad += !v->good;

@@ -20,7 +20,6 @@ struct storm_log {
     struct storm_deed deeds[3]; /* of the present tick, the one before and the one before that */
     bool ill;
     uint32_t frame;       /* number of the newest frame seen */
-    uint64_t line;        /* and its bits */
     unsigned overlapped;  /* bit 0: the transfer before met the link's arming; bit 1: the one before that */
     uint32_t overwritten; /* words, so far */
 };

@@ -103,9 +103,6 @@ def run(build: Path) -> None:
             "resets": json.loads(node.run("image_check", "resets")),
         }
         result["storm"] = [json.loads(line) for line in node.run("image_storm", 0, 2).splitlines()]
-        for line in result["storm"]:
-            for key in ("injected", "lines", "links"):
-                del line[key]
         result |= {"handlers": node.handlers(), "by_path": node.by_path()}
         result["ram"] = max(c["ram"] for c in node.costs)
         result["boot_cycles"] = max(c["boot_cycles"] for c in node.costs)
