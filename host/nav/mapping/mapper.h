@@ -1,8 +1,8 @@
 /* Mapping by touch: where the robot is and what its world is like, from rows alone. The first pose is the origin.
  *
- * Particles are hypotheses of which contact is of which face, each with a Gaussian over pose and map; they differ in
- * how far they trust the odometry, too, and are weighed by the likelihood of all rows. A lattice of tiles, where the
- * evidence is for one, is tried on all rows so far before it is believed. */
+ * Twelve hypotheses differ in how far they trust the odometry; each is a Gaussian over pose and map, weighed by the
+ * likelihood of all rows. A lattice of tiles, where the evidence is for one, is tried on all rows so far before it is
+ * believed. */
 #ifndef NAV_MAPPER_H
 #define NAV_MAPPER_H
 
@@ -17,15 +17,14 @@ extern "C" {
 struct nav_mapper;
 
 struct nav_mapper_options {
-    int particles; /* at least 1 */
-    bool lattice;  /* whether to look for a lattice of tiles */
+    bool lattice; /* whether to look for a lattice of tiles */
 };
 
 /* The options' defaults. */
 struct nav_mapper_options nav_mapper_default(void);
 
 /* Of the problem's arena only `classes` is read. Copies nothing: the problem and its arrays must outlive it. NULL: no
- * memory, or options out of range. */
+ * memory. */
 struct nav_mapper *nav_mapper_new(const struct nav_problem *, const struct nav_mapper_options *);
 void nav_mapper_free(struct nav_mapper *);
 

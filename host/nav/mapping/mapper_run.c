@@ -6,23 +6,21 @@
 #include "kidnap.h"
 
 static const double SCALE_LEAST = 0.3, SCALE_MOST = 1.5; /* of the odometry's noise */
-static const double BEHIND = 30.0;                       /* nats at which a particle is given up */
+static const double BEHIND = 30.0;                       /* nats at which a hypothesis is given up */
 static const double MARGIN = 3.0;                        /* nats by which a new lattice must be better */
 static const double GROWN = 1.25;                        /* of the borders, since a lattice was sought last */
 static const double REFUSED = 5.0;                       /* nats against a lattice at which it is given up */
 static const double RIGHT_MOST = 0.15;                   /* rad between a lattice and faces that stand along it */
-enum { PARTICLES = 12, PARTICLES_MOST = 5000, SCALES = 4, CATCH_UP = 60, STREAM = 21 };
+enum { CATCH_UP = 60 };
 
 struct nav_mapper_options nav_mapper_default(void)
 {
-    return (struct nav_mapper_options){.particles = PARTICLES, .lattice = true};
+    return (struct nav_mapper_options){.lattice = true};
 }
 
-/* Particles take the scales in turn. */
-static double mapper_scale(int particle, int count)
+static double mapper_scale(int hypothesis)
 {
-    double share = (particle % SCALES) / (SCALES - 1.0);
-    return count < SCALES ? 1.0 : SCALE_LEAST * pow(SCALE_MOST / SCALE_LEAST, share);
+    return SCALE_LEAST * pow(SCALE_MOST / SCALE_LEAST, hypothesis / (NAV_MAPPER_HYPOTHESES - 1.0));
 }
 
 static int mapper_init(struct nav_mapper *m)
@@ -33,24 +31,20 @@ static int mapper_init(struct nav_mapper *m)
     failed |= nav_lattice_search_init(&m->search, problem->arena.classes);
     failed |= nav_kidnap_init(&m->kidnaps, problem);
     failed |= nav_kept_init(&m->challenger, problem);
-    m->particle = calloc((size_t)m->options.particles, sizeof *m->particle);
-    for (int n = 0; m->particle && n < m->options.particles; n++) {
-        failed |= nav_particle_map_init(&m->particle[n], problem->arena.classes);
-        m->particle[n].scale = mapper_scale(n, m->options.particles);
+    for (int n = 0; n < NAV_MAPPER_HYPOTHESES; n++) {
+        failed |= nav_particle_map_init(&m->hypothesis[n], problem->arena.classes);
+        m->hypothesis[n].scale = mapper_scale(n);
     }
-    return m->particle ? failed : -1;
+    return failed;
 }
 
 struct nav_mapper *nav_mapper_new(const struct nav_problem *problem, const struct nav_mapper_options *options)
 {
     struct nav_mapper *m = calloc(1, sizeof *m);
-    if (!m || options->particles < 1 || options->particles > PARTICLES_MOST) {
-        free(m);
+    if (!m)
         return NULL;
-    }
     m->problem = problem;
     m->options = *options;
-    nav_rng_seed(&m->rng, problem->seed, STREAM);
     if (mapper_init(m)) {
         nav_mapper_free(m);
         return NULL;
@@ -62,9 +56,8 @@ void nav_mapper_free(struct nav_mapper *m)
 {
     if (!m)
         return;
-    for (int n = 0; m->particle && n < m->options.particles; n++)
-        nav_particle_map_free(&m->particle[n]);
-    free(m->particle);
+    for (int n = 0; n < NAV_MAPPER_HYPOTHESES; n++)
+        nav_particle_map_free(&m->hypothesis[n]);
     nav_kept_free(&m->challenger);
     nav_course_free(&m->course);
     nav_lattice_search_free(&m->search);
@@ -73,11 +66,11 @@ void nav_mapper_free(struct nav_mapper *m)
     free(m);
 }
 
-struct nav_particle_map *nav_mapper_best(const struct nav_mapper *m)
+const struct nav_particle_map *nav_mapper_best(const struct nav_mapper *m)
 {
-    struct nav_particle_map *best = &m->particle[0];
-    for (int n = 1; n < m->options.particles; n++)
-        best = m->particle[n].evidence > best->evidence ? &m->particle[n] : best;
+    const struct nav_particle_map *best = &m->hypothesis[0];
+    for (int n = 1; n < NAV_MAPPER_HYPOTHESES; n++)
+        best = m->hypothesis[n].evidence > best->evidence ? &m->hypothesis[n] : best;
     return best;
 }
 
@@ -86,8 +79,8 @@ void nav_mapper_adopt(struct nav_mapper *m, struct nav_kept *kept)
     struct nav_course course = m->course;
     m->course = kept->course;
     kept->course = course;
-    for (int n = 0; n < m->options.particles; n++)
-        nav_particle_map_copy(&m->particle[n], &kept->map);
+    for (int n = 0; n < NAV_MAPPER_HYPOTHESES; n++)
+        nav_particle_map_copy(&m->hypothesis[n], &kept->map);
     m->challenged = false;
 }
 
@@ -95,9 +88,9 @@ void nav_mapper_adopt(struct nav_mapper *m, struct nav_kept *kept)
 static void mapper_resample(struct nav_mapper *m)
 {
     const struct nav_particle_map *best = nav_mapper_best(m);
-    for (int n = 0; n < m->options.particles; n++) {
-        if (m->particle[n].evidence < best->evidence - BEHIND)
-            nav_particle_map_copy(&m->particle[n], best);
+    for (int n = 0; n < NAV_MAPPER_HYPOTHESES; n++) {
+        if (m->hypothesis[n].evidence < best->evidence - BEHIND)
+            nav_particle_map_copy(&m->hypothesis[n], best);
     }
 }
 
@@ -146,21 +139,21 @@ static void mapper_refuse(struct nav_mapper *m)
     const struct nav_floor *floor = &nav_mapper_best(m)->floor;
     if (!floor->known || floor->evidence > nav_trail_patches(&m->course.trail, true) - REFUSED)
         return;
-    for (int n = 0; n < m->options.particles; n++)
-        m->particle[n].floor.known = false;
+    for (int n = 0; n < NAV_MAPPER_HYPOTHESES; n++)
+        m->hypothesis[n].floor.known = false;
 }
 
-/* Mean and covariance of the particles' mixture. */
+/* Mean and covariance of the hypotheses' mixture. */
 static void mapper_estimate(const struct nav_mapper *m, struct nav_estimate *out)
 {
     const struct nav_particle_map *best = nav_mapper_best(m);
     struct nav_gaussian_sum sum = {.about = nav_particle_map_pose(best)};
-    for (int n = 0; n < m->options.particles; n++) {
-        const struct nav_joint *j = &m->particle[n].joint;
-        struct nav_gaussian g = {.mean = nav_particle_map_pose(&m->particle[n])};
+    for (int n = 0; n < NAV_MAPPER_HYPOTHESES; n++) {
+        const struct nav_joint *j = &m->hypothesis[n].joint;
+        struct nav_gaussian g = {.mean = nav_particle_map_pose(&m->hypothesis[n])};
         for (int r = 0; r < 9; r++)
             g.covariance[r] = j->cov[r / 3 * j->room + r % 3];
-        nav_gaussian_sum_add(&sum, exp(m->particle[n].evidence - best->evidence), &g);
+        nav_gaussian_sum_add(&sum, exp(m->hypothesis[n].evidence - best->evidence), &g);
     }
     struct nav_gaussian all = nav_gaussian_sum_moments(&sum);
     nav_gaussian_estimate(&all, out);
@@ -168,11 +161,11 @@ static void mapper_estimate(const struct nav_mapper *m, struct nav_estimate *out
 
 static void mapper_answer(const struct nav_mapper *m, struct nav_estimate *out)
 {
-    *out = (struct nav_estimate){.states = m->options.particles, .touched = m->options.particles};
+    *out = (struct nav_estimate){.states = NAV_MAPPER_HYPOTHESES, .touched = NAV_MAPPER_HYPOTHESES};
     mapper_estimate(m, out);
-    out->evaluations = m->options.particles + (m->challenged ? CATCH_UP : 0);
-    out->bytes = (size_t)m->options.particles * nav_particle_map_bytes(m->record.classes) +
-                 nav_record_bytes(&m->record) + nav_kidnap_bytes(&m->record);
+    out->evaluations = NAV_MAPPER_HYPOTHESES + (m->challenged ? CATCH_UP : 0);
+    out->bytes = NAV_MAPPER_HYPOTHESES * nav_particle_map_bytes(m->record.classes) + nav_record_bytes(&m->record) +
+                 nav_kidnap_bytes(&m->record);
 }
 
 void nav_mapper_step(struct nav_mapper *m, const struct nav_row *row, struct nav_estimate *out)
@@ -180,8 +173,8 @@ void nav_mapper_step(struct nav_mapper *m, const struct nav_row *row, struct nav
     struct nav_record_row taken = nav_record_at(&m->record, nav_record_take(&m->record, row));
     const struct nav_particle_map *best = nav_mapper_best(m);
     double evidence = best->evidence, floor = best->floor.evidence, patches = nav_trail_patches(&m->course.trail, true);
-    for (int n = 0; n < m->options.particles; n++)
-        nav_particle_map_take(&m->particle[n], &m->record, &taken, n < SCALES ? NULL : &m->rng);
+    for (int n = 0; n < NAV_MAPPER_HYPOTHESES; n++)
+        nav_particle_map_take(&m->hypothesis[n], &m->record, &taken);
     nav_course_follow(&m->course, nav_mapper_best(m), &m->record, &taken);
     best = nav_mapper_best(m);
     floor = best->floor.known ? best->floor.evidence - floor : 0.0;

@@ -51,7 +51,7 @@ void nav_particle_map_copy(struct nav_particle_map *to, const struct nav_particl
 }
 
 static void particle_map_contact(struct nav_particle_map *p, const struct nav_record *r, const struct nav_model *ray,
-                                 const struct nav_record_contact *c, struct nav_rng *rng)
+                                 const struct nav_record_contact *c)
 {
     double sigma = r->problem->robot.radial_sigma, length = ray->length, ghost = r->problem->settings.radial.ghost;
     double distance = isinf(c->distance) ? length : (double)c->distance, weight = (double)c->weight;
@@ -69,12 +69,10 @@ static void particle_map_contact(struct nav_particle_map *p, const struct nav_re
     }
     struct nav_contact contact = {nav_touches_keep(&p->touches, touch), sigma / sqrt(weight), length, ghost};
     p->evidence += weight * nav_faces_take(&p->faces, &p->joint, &p->touches, &contact);
-    double chance = rng ? nav_rng_uniform(rng) : -1.0;
-    p->evidence += nav_segment_take(&p->faces, &p->joint, &p->touches, &contact, chance);
+    p->evidence += nav_segment_take(&p->faces, &p->joint, &p->touches, &contact);
 }
 
-void nav_particle_map_take(struct nav_particle_map *p, const struct nav_record *r, const struct nav_record_row *row,
-                           struct nav_rng *rng)
+void nav_particle_map_take(struct nav_particle_map *p, const struct nav_record *r, const struct nav_record_row *row)
 {
     double scale = p->scale * p->scale;
     struct nav_noise noise = {scale * row->noise.position, scale * row->noise.heading};
@@ -84,7 +82,7 @@ void nav_particle_map_take(struct nav_particle_map *p, const struct nav_record *
     p->evidence += nav_faces_stand(&p->faces, &p->joint, r->problem->robot.body_radius);
     for (int ray = 0; ray < r->rays; ray++) {
         if (row->contact[ray].weight > 0.0F)
-            particle_map_contact(p, r, &rays[ray], &row->contact[ray], rng);
+            particle_map_contact(p, r, &rays[ray], &row->contact[ray]);
     }
     for (int tip = 0; tip < r->tips; tip++) {
         const float *window = row->window + (ptrdiff_t)tip * (1 + r->classes);

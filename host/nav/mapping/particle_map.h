@@ -1,11 +1,10 @@
-/* One hypothesis of a mapper: a Gaussian over pose and map, given which contact is of which face. */
+/* One hypothesis of a mapper: a Gaussian over pose and map, by a trust in the odometry of its own. */
 #ifndef NAV_PARTICLE_MAP_H
 #define NAV_PARTICLE_MAP_H
 
 #include "faces.h"
 #include "floor.h"
 #include "record.h"
-#include "rng.h"
 
 struct nav_particle_map {
     struct nav_joint joint;
@@ -26,9 +25,8 @@ void nav_particle_map_begin(struct nav_particle_map *);
 /* Becomes equal but for the scale. */
 void nav_particle_map_copy(struct nav_particle_map *to, const struct nav_particle_map *from);
 
-/* Takes a row. rng: contacts that may be of several faces are drawn by it; NULL: each is of the likeliest. */
-void nav_particle_map_take(struct nav_particle_map *, const struct nav_record *, const struct nav_record_row *,
-                           struct nav_rng *rng);
+/* Takes a row. */
+void nav_particle_map_take(struct nav_particle_map *, const struct nav_record *, const struct nav_record_row *);
 
 struct nav_pose nav_particle_map_pose(const struct nav_particle_map *);
 

@@ -85,15 +85,11 @@ static void segment_weigh(const struct nav_faces *f, const struct nav_joint *j, 
         c->total += c->likelihood[n];
 }
 
-static int segment_choose(const struct segment_choice *c, int count, double chance)
+static int segment_choose(const struct segment_choice *c, int count)
 {
     int best = 0;
-    double left = chance * c->total;
-    for (int n = 0; n < count; n++) {
-        if (chance >= 0.0 && (left -= c->likelihood[n]) < 0.0)
-            return n;
+    for (int n = 1; n < count; n++)
         best = c->likelihood[n] > c->likelihood[best] ? n : best;
-    }
     return best;
 }
 
@@ -155,7 +151,7 @@ static double segment_score(const struct nav_touches_line *line, double total, d
 /* The line is one of many that might have been found: it must be worth the choice of two contacts. A single contact and
  * its normal were not chosen. */
 static double segment_place(struct nav_faces *f, struct nav_joint *j, const struct nav_touches *touches,
-                            const struct nav_touches_line *line, const struct nav_contact *contact, double chance)
+                            const struct nav_touches_line *line, const struct nav_contact *contact)
 {
     struct segment_choice choice;
     int count = f->count;
@@ -164,7 +160,7 @@ static double segment_place(struct nav_faces *f, struct nav_joint *j, const stru
     double score = segment_score(line, choice.total, contact->length);
     if (score < (single ? 0.0 : 2.0 * log(nav_touches_count(f->loose))))
         return 0.0;
-    int chosen = segment_choose(&choice, count + 2, chance);
+    int chosen = segment_choose(&choice, count + 2);
     if (!single && chosen >= count && nav_faces_apart(f, j, touches, line->used, contact) > score)
         return nav_faces_drain(f, j, touches, line->used, contact, true);
     f->loose &= ~line->used;
@@ -176,13 +172,13 @@ static double segment_place(struct nav_faces *f, struct nav_joint *j, const stru
 }
 
 double nav_segment_take(struct nav_faces *f, struct nav_joint *j, const struct nav_touches *touches,
-                        const struct nav_contact *contact, double chance)
+                        const struct nav_contact *contact)
 {
     struct nav_touches_line line;
     f->loose &= touches->held;
     if (!(f->loose >> contact->place & 1) || !nav_touches_fit(touches, contact->place, f->loose, &line))
         return 0.0;
-    double sum = segment_place(f, j, touches, &line, contact, chance);
+    double sum = segment_place(f, j, touches, &line, contact);
     sum += nav_faces_drain(f, j, touches, ~0ULL, contact, false);
     nav_faces_review(f, j);
     return sum;

@@ -4,9 +4,8 @@
 
 #include "faces.h"
 
-/* Tells which face the loose contacts about this one are of, where they lie in a row, or makes a face of them. chance:
- * 0 to 1, by which it is drawn; below 0: the likeliest. Returns the log-likelihood that this adds. */
-double nav_segment_take(struct nav_faces *, struct nav_joint *, const struct nav_touches *, const struct nav_contact *,
-                        double chance);
+/* Tells which face the loose contacts about this one are most likely of, where they lie in a row, or makes a face of
+ * them. Returns the log-likelihood that this adds. */
+double nav_segment_take(struct nav_faces *, struct nav_joint *, const struct nav_touches *, const struct nav_contact *);
 
 #endif

@@ -108,7 +108,7 @@ def one(name: str, program: str, world: tuple, seed: int) -> dict[str, float | s
         except RuntimeError as error:
             return {"error": str(error)}
     else:
-        run = mapping.run(*rows, seed)
+        run = mapping.run(*rows)
         poses, us = run.table["pose"], run.step_us
     return {
         "error_median_m": map_scoring.trajectory(poses, rows[2].truth)["error_median_m"],

@@ -42,11 +42,11 @@ SLOWER = 1.5  # in the own map: times the rows to lock in the true one
 OWN_MEDIANS = ("true_rows", "own_rows", "true_error_m", "own_error_m")
 
 
-def one(family: str, seed: int, rows: int = ROWS, own: bool = False, **options) -> dict[str, float | None]:
+def one(family: str, seed: int, rows: int = ROWS, own: bool = False) -> dict[str, float | None]:
     """Figures of one run; `own`: also of a drive in the map that it left."""
     made = make(family, seed, rows)
     scene = made.scene
-    mapped = mapping.run(scene.robot, scene.arena.textures, made.observations, seed, **options)
+    mapped = mapping.run(scene.robot, scene.arena.textures, made.observations)
     return map_scoring.score(mapped, scene.arena) | (own_figures(own_map.score(mapped, family, seed)[0]) if own else {})
 
 

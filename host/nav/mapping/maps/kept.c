@@ -86,7 +86,7 @@ void nav_kept_copy(struct nav_kept *k, const struct nav_particle_map *map, const
 void nav_kept_take(struct nav_kept *k, const struct nav_record *r)
 {
     struct nav_record_row row = nav_record_at(r, k->course.row);
-    nav_particle_map_take(&k->map, r, &row, NULL);
+    nav_particle_map_take(&k->map, r, &row);
     nav_course_follow(&k->course, &k->map, r, &row);
 }
 

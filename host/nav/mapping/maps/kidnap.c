@@ -27,8 +27,7 @@ enum {
     SOUGHT_ROWS = 150,
     CATCH_UP_MOST = NAV_MAPPER_AGAIN,
     SPLITS = 12,
-    OTHERS = 3,
-    SCALES = 4
+    OTHERS = 3
 };
 
 /* Where rows enter a map. */
@@ -212,14 +211,14 @@ static double kidnap_try_at(struct nav_mapper *m, const struct nav_kept *older, 
  * map with them is `joined`. */
 static double kidnap_try(struct nav_mapper *m, const struct nav_kept *older, const struct kidnap_entry *entry)
 {
-    int count = m->options.particles < SCALES ? m->options.particles : SCALES, best = 0;
+    int best = 0;
     double most = -INFINITY, last = 0.0;
-    for (int n = 0; n < count; n++) {
-        last = kidnap_try_at(m, older, entry, m->particle[n].scale);
+    for (int n = 0; n < NAV_MAPPER_HYPOTHESES; n++) {
+        last = kidnap_try_at(m, older, entry, m->hypothesis[n].scale);
         best = last > most ? n : best;
         most = fmax(last, most);
     }
-    return last < most ? kidnap_try_at(m, older, entry, m->particle[best].scale) : last;
+    return last < most ? kidnap_try_at(m, older, entry, m->hypothesis[best].scale) : last;
 }
 
 static void kidnap_join(struct nav_mapper *m, struct nav_mapper_part *part, struct nav_pose at)
@@ -402,8 +401,8 @@ void nav_kidnap_take(struct nav_mapper *m, const struct nav_record_row *row, dou
     struct nav_kidnaps *k = &m->kidnaps;
     const struct nav_particle_map *best = nav_mapper_best(m);
     double before = k->fresh.evidence;
-    nav_particle_map_take(&k->fresh, &m->record, row, NULL);
-    nav_particle_map_take(&k->second.map, &m->record, row, NULL);
+    nav_particle_map_take(&k->fresh, &m->record, row);
+    nav_particle_map_take(&k->second.map, &m->record, row);
     nav_course_follow(&k->second.course, &k->second.map, &m->record, row);
     windows = best->floor.known ? windows : patches;
     k->gained[(m->course.row - 1) % CATCH_UP_MOST] = (struct nav_gained){contacts, windows, patches};

@@ -7,6 +7,7 @@
 
 #define NAV_MAPPER_AXES_KNOWN 1.0 /* rad^2 */
 enum {
+    NAV_MAPPER_HYPOTHESES = 12,
     NAV_MAPPER_KEPT = 3,
     NAV_MAPPER_AGAIN = 2000, /* rows taken again at once, at most */
     NAV_MAPPER_PARTS = 64,
@@ -56,18 +57,17 @@ struct nav_mapper {
     const struct nav_problem *problem;
     struct nav_mapper_options options;
     struct nav_record record;
-    struct nav_particle_map *particle; /* [particles] */
-    struct nav_course course;          /* of the likeliest */
-    struct nav_kept challenger;        /* takes all rows of this map again, with a lattice */
-    bool challenged;                   /* whether there is one */
+    struct nav_particle_map hypothesis[NAV_MAPPER_HYPOTHESES];
+    struct nav_course course;   /* of the likeliest */
+    struct nav_kept challenger; /* takes all rows of this map again, with a lattice */
+    bool challenged;            /* whether there is one */
     struct nav_lattice_search search;
     int sought; /* borders when a lattice was sought last */
     struct nav_kidnaps kidnaps;
-    struct nav_rng rng;
 };
 
 /* The likeliest hypothesis. */
-struct nav_particle_map *nav_mapper_best(const struct nav_mapper *);
+const struct nav_particle_map *nav_mapper_best(const struct nav_mapper *);
 
 /* Goes on from this hypothesis and its course; the course that was in use is left in its place. */
 void nav_mapper_adopt(struct nav_mapper *, struct nav_kept *);

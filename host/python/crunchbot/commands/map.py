@@ -3,9 +3,7 @@
 import argparse
 import json
 
-from ..arguments import whole_number
 from ..nav import mapping
-from ..nav.mapper import PARTICLES_MOST, SEED_MOST, default_particles
 
 EXAMPLE = "whisker map examples/scene --out touched --json"
 
@@ -15,15 +13,6 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", required=True, metavar="MAP", help="folder to write: a scene for localise, and map.yaml"
     )
-    parser.add_argument(
-        "--particles",
-        type=whole_number(1, PARTICLES_MOST),
-        metavar="N",
-        help=f"hypotheses held at a time (default: {default_particles()})",
-    )
-    parser.add_argument(
-        "--seed", type=whole_number(0, SEED_MOST), default=0, help="of every draw (default: %(default)s)"
-    )
     parser.add_argument("--no-lattice", action="store_true", help="do not look for a lattice of tiles")
     parser.add_argument("--json", action="store_true", help="print the summary as one line of JSON")
     parser.set_defaults(run=run)
@@ -31,8 +20,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     robot, textures, rows = mapping.read(arguments.scene)
-    options = (arguments.seed, arguments.particles, not arguments.no_lattice, arguments.json)
-    mapped = mapping.run(robot, textures, rows, *options)
+    mapped = mapping.run(robot, textures, rows, not arguments.no_lattice, arguments.json)
     reported = mapping.summary(mapped, mapping.write_map(arguments.out, mapped))
     print(json.dumps(reported) if arguments.json else "\n".join(f"{key}: {value}" for key, value in reported.items()))
     return 0

@@ -3,8 +3,6 @@
 import argparse
 from pathlib import Path
 
-from ..arguments import whole_number
-from ..nav.mapper import SEED_MOST
 from ..robot.mapper import MapperProcess, Settings
 from ..robot.navigator import write_report
 from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
@@ -24,16 +22,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stay", action="store_true", help="after the end of a run wait for the next")
     text = "what was taken, kept in this file and gone on from; a new run wants a new file"
     parser.add_argument("--journal", type=Path, metavar="FILE", help=text)
-    parser.add_argument(
-        "--seed", type=whole_number(0, SEED_MOST), default=0, help="of every draw (default: %(default)s)"
-    )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.scene)
     stop = stop_on_signals()
-    settings = Settings(arguments.out, arguments.stay, arguments.journal, arguments.seed)
+    settings = Settings(arguments.out, arguments.stay, arguments.journal)
     try:
         with open_link("mapper", arguments) as link:
             counters = MapperProcess(link, robot, settings).run(stop)

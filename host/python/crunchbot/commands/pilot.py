@@ -101,7 +101,7 @@ def _body(arguments) -> tuple:
 def _parts(arguments, body: tuple, link: Link, wheels: Wheels, stack: ExitStack) -> SimpleNamespace:
     scene, texture, radial = body
     pilot = Pilot(scene.robot, texture, radial, arguments.seed, wheels)
-    made = choices_of(arguments.choose, scene.robot, arguments.seed, pilot.behaviour.choices)
+    made = choices_of(arguments.choose, scene.robot, pilot.behaviour.choices)
     pilot.behaviour.choices, taker = made
     out = stack.enter_context(open(arguments.out, "w", newline=""))  # noqa: SIM115
     traces = stack.enter_context(open(arguments.traces, "w", newline=""))  # noqa: SIM115

@@ -23,14 +23,12 @@ CORNER = np.dtype([(name, "f8") for name in ("x", "y", "xx", "xy", "yy")] + [("f
 FACES, CORNERS = ffi.typeof("struct nav_mapper_face[]"), ffi.typeof("struct nav_mapper_corner[]")
 assert FACE.itemsize == ffi.sizeof("struct nav_mapper_face")
 assert CORNER.itemsize == ffi.sizeof("struct nav_mapper_corner")
-SEED_MOST = 2**64 - 1
-PARTICLES_MOST = 5000
 PATCH_M = 0.3
 TILES_EACH_WAY = 24  # of the lattice's first tile: host/nav/mapping/floor.h
 
 
 class MappingError(UserError, ValueError):
-    """Options that no mapper takes; one line."""
+    """A mapper that cannot be; one line."""
 
 
 @dataclass(frozen=True)
@@ -97,26 +95,19 @@ class Mapper:
         self,
         robot: Robot,
         textures: tuple[str, ...],
-        seed: int = 0,
-        particles: int | None = None,
         lattice: bool = True,
         normals: bool = False,
     ):
         """`lattice`: whether to look for one; `normals`: rows may hold directions of the surfaces that whiskers touch.
-        MappingError when an option is out of range, or there is no memory."""
-        particles = default_particles() if particles is None else particles
-        if not 1 <= particles <= PARTICLES_MOST:
-            raise MappingError(f"--particles {particles}: outside 1 to {PARTICLES_MOST}; choose a number inside")
-        if not 0 <= seed <= SEED_MOST:
-            raise MappingError(f"--seed {seed}: outside 0 to 2^64 - 1; choose a number inside")
+        MappingError when there is no memory."""
         self._problem, self._keep = problem_of(Scene(nowhere(textures), robot), {})
         self._texture = (len(robot.of_role("texture")), len(textures))
         self._rays = len(robot.of_role("object"))
-        self._problem.seed, self._problem.robot.normals = seed, normals
-        options = ffi.new("struct nav_mapper_options *", {"particles": particles, "lattice": lattice})
+        self._problem.robot.normals = normals
+        options = ffi.new("struct nav_mapper_options *", {"lattice": lattice})
         made = lib.nav_mapper_new(self._problem, options)
         if made == ffi.NULL:
-            raise MappingError(f"--particles {particles}: they do not fit in memory; choose fewer")
+            raise MappingError("a mapper does not fit in memory; free some")
         self._mapper = ffi.gc(made, lib.nav_mapper_free)
 
     def replay(self, rows: Observations, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -191,11 +182,6 @@ class Mapper:
     @property
     def bad_rows(self) -> int:
         return lib.nav_mapper_bad_rows(self._mapper)
-
-
-def default_particles() -> int:
-    """How many hypotheses a mapper holds where nobody says."""
-    return int(lib.nav_mapper_default().particles)
 
 
 def nowhere(textures: tuple[str, ...]) -> Arena:

@@ -85,13 +85,11 @@ def run(
     robot: Robot,
     textures: tuple[str, ...],
     rows: Observations,
-    seed: int = 0,
-    particles: int | None = None,
     lattice: bool = True,
     quiet: bool = True,
 ) -> Mapped:
-    """Map all rows. MappingError when an option is out of range."""
-    mapper = Mapper(robot, textures, seed, particles, lattice, rows.normal is not None)
+    """Map all rows. MappingError when there is no memory."""
+    mapper = Mapper(robot, textures, lattice, rows.normal is not None)
     parts = [(np.zeros(0, ESTIMATE), np.zeros(0))]
     for first in bar(range(0, len(rows), CHUNK), disable=quiet, unit_scale=CHUNK, unit="rows", desc="map"):
         parts.append(mapper.replay(rows, first, min(CHUNK, len(rows) - first)))

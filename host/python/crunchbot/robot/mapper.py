@@ -42,12 +42,11 @@ ROWS = "observation"
 @dataclass(frozen=True)
 class Settings:
     """out: folder of the map, written at the end of a run; None: none is. stay: go on after it, for the next. journal: file of
-    the rows taken; None: none is kept. seed: of every draw."""
+    the rows taken; None: none is kept."""
 
     out: Path | None = None
     stay: bool = False
     journal: Path | None = None
-    seed: int = 0
 
 
 class MapperProcess:
@@ -149,7 +148,7 @@ class MapperProcess:
         rows = [*step.lead(), step.last()]
         if self._mapper is None:
             normals = has_normals(step.row.names)
-            self._mapper = Mapper(self._robot, self._scene.arena.textures, self._settings.seed, normals=normals)
+            self._mapper = Mapper(self._robot, self._scene.arena.textures, normals=normals)
         taken = joined([observed(row, self._scene) for row in rows])
         table, step_us = self._mapper.replay(taken, 0, len(taken))
         self._rows.append(taken)

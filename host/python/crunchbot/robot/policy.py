@@ -28,8 +28,8 @@ def add_choices(parser: argparse.ArgumentParser) -> None:
 class OwnMap:
     """The pilot's own mapper: no other process is needed, and the same rows give the same map on any machine."""
 
-    def __init__(self, robot: Robot, seed: int):
-        self._robot, self._seed = replace(robot, sensors=()), seed
+    def __init__(self, robot: Robot):
+        self._robot = replace(robot, sensors=())
         self._mapper: Mapper | None = None
         self._scene: Scene | None = None
         self._pose = np.zeros(3)
@@ -39,7 +39,7 @@ class OwnMap:
         if self._mapper is None:
             textures = textures_in(row.names, self._robot) or ("NONE",)
             self._scene = Scene(Arena((PATCH_M, PATCH_M), PATCH_M, textures, ("?",), ()), self._robot)
-            self._mapper = Mapper(self._robot, textures, self._seed, normals=has_normals(row.names))
+            self._mapper = Mapper(self._robot, textures, normals=has_normals(row.names))
         self._pose = self._mapper.replay(observed(row, self._scene), 0, 1)[0]["pose"][0].copy()
 
     def pose(self) -> np.ndarray | None:
@@ -51,11 +51,11 @@ class OwnMap:
         return self._mapper.map()
 
 
-def choices_of(name: str, robot: Robot, seed: int, random: Choices) -> tuple[Choices, OwnMap | None]:
+def choices_of(name: str, robot: Robot, random: Choices) -> tuple[Choices, OwnMap | None]:
     """The choices of this name, and what must take every row that is sent; `random`: the behaviour's own."""
     if name == RANDOM:
         return random, None
-    own = OwnMap(robot, seed)
+    own = OwnMap(robot)
     return Mapping(robot, VEHICLE, own.pose, own.map, random), own
 
 

@@ -72,7 +72,7 @@ def half_an_hour(report) -> None:
         made.observations, **{n: getattr(made.observations, n)[:2] for n in ("t_s", "t_text", "odometry", "texture")}
     )
     few = replace(few, radial_m=few.radial_m[:2], truth=few.truth[:2])
-    mapping.run(made.scene.robot, made.scene.arena.textures, few, particles=1)
+    mapping.run(made.scene.robot, made.scene.arena.textures, few)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     mapped = run(made, made.observations)
     peak = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)

@@ -10,7 +10,6 @@ from mapkit import SEEDS, errors, mapped
 from crunchbot import cli
 from crunchbot.nav import localise, mapping
 from crunchbot.nav.map_scene import map_scene
-from crunchbot.nav.mapper import Mapper, MappingError
 from crunchbot.occupancy import read_map
 from crunchbot.scene import load
 from crunchbot_lab.scenes import write_scene
@@ -94,14 +93,6 @@ def test_faults_leave_it_finite_and_better_than_odometry(family):
         assert np.isfinite(table["pose"]).all() and np.isfinite(table["covariance"]).all()
     mine, wheels = errors(family, 1200)
     assert (mine < np.maximum(wheels, 0.06)).sum() >= BETTER
-
-
-def test_options_out_of_range_are_refused():
-    robot = make("anchor", 1, 1).scene.robot
-    with pytest.raises(MappingError, match="--particles 0"):
-        Mapper(robot, ("A",), particles=0)
-    with pytest.raises(MappingError, match="--seed -1"):
-        Mapper(robot, ("A",), seed=-1)
 
 
 @pytest.fixture(scope="module")
