@@ -20,9 +20,6 @@ WAIVED = {
         f"firmware/dspic/port_dspic/{name}.c" for name in ("port", "chip/main")
     ): "the chip's vectors call the port, which jumps by it to the application; a simulated node has another jump",
     frozenset(
-        f"host/nav/mapping/{name}.c" for name in ("mapper_run", "maps/kidnap")
-    ): "a map that begins anew takes the place of the one that found itself carried",
-    frozenset(
         f"sim/dspic/{name}.c" for name in ("dma", "dspic", "events", "interrupts", "pins", "spi", "system", "timer")
     ): "the blocks of a chip act on one another as its wires do: an event of SPI asks DMA for a word, which SPI gives",
 }

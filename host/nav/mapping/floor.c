@@ -4,10 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "face.h"
+
 static const double BLUR_M = 0.012; /* of a border, as windows show it */
 static const double NEAR = 3.0;     /* standard deviations from a border within which it matters */
 static const double SURE = 0.9;     /* of a tile's texture, before its borders correct the pose */
-static const double RIGHT_RAD = 0.006;
 static const double AGREEMENT_WINDOWS = 60.0, AGREEMENT_LEAST = -0.2; /* nats */
 
 int nav_floor_init(struct nav_floor *f, int classes)
@@ -212,5 +213,5 @@ void nav_floor_adopt(struct nav_floor *f, struct nav_joint *j, const struct nav_
     nav_linear_add(&form, NAV_JOINT_LATTICE_TURN, 1.0);
     nav_linear_add(&form, NAV_JOINT_AXES, -1.0);
     if (right)
-        nav_joint_measure(j, &form, j->mean[NAV_JOINT_AXES] - l->turn, RIGHT_RAD * RIGHT_RAD);
+        nav_joint_measure(j, &form, j->mean[NAV_JOINT_AXES] - l->turn, NAV_FACE_RIGHT_RAD * NAV_FACE_RIGHT_RAD);
 }

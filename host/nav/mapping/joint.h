@@ -20,6 +20,8 @@ enum {
     NAV_JOINT_FACES          /* the first face; two numbers each: direction of its normal, offset along it */
 };
 
+#define NAV_JOINT_AXES_KNOWN 1.0 /* rad^2: variance below which the axes are known */
+
 /* mean and cov belong to the owner; cov is row-major with `room` columns. */
 struct nav_joint {
     int count, room;

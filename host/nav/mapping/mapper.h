@@ -2,7 +2,7 @@
  *
  * Twelve hypotheses differ in how far they trust the odometry; each is a Gaussian over pose and map, weighed by the
  * likelihood of all rows. A lattice of tiles, where the evidence is for one, is tried on all rows so far before it is
- * believed. */
+ * believed. A mapper makes one map: of a robot that is carried off it says so, and takes no more. */
 #ifndef NAV_MAPPER_H
 #define NAV_MAPPER_H
 
@@ -83,21 +83,12 @@ struct nav_mapper_lattice nav_mapper_lattice(const struct nav_mapper *);
 /* Probability of a tile's likeliest texture, and which it is; 0: nothing was read there. */
 double nav_mapper_tile(const struct nav_mapper *, int column, int row, int *texture);
 
-/* A part of the run between two kidnaps: the robot was carried off before row `first`, which was noticed at row
- * `noticed`. Its poses are in a frame of its own, whose origin is the first of them, until it was joined at row
- * `joined` (-1: not yet) with part `into`, in whose frame that origin is at `place`. A part that is noticed and joined
- * in one row was found in the map of the part before. */
-struct nav_mapper_part {
-    int number, into;
-    long first, noticed, joined;
-    struct nav_pose place;
+/* The robot was carried off before row `first`, counted from 0, which was noticed at row `noticed`; -1: it was not.
+ * Then the map is the one of before that row, and takes no more rows: begin another mapper at `first`. */
+struct nav_mapper_lost {
+    long first, noticed;
 };
-
-/* Parts so far, in order, the last 64 at most: the first `room` go to `out`. Returns how many there are. */
-long nav_mapper_parts(const struct nav_mapper *, struct nav_mapper_part *out, long room);
-
-/* The part in whose frame the estimate is. */
-int nav_mapper_frame(const struct nav_mapper *);
+struct nav_mapper_lost nav_mapper_lost(const struct nav_mapper *);
 
 uint64_t nav_mapper_bad_cells(const struct nav_mapper *);
 uint64_t nav_mapper_bad_rows(const struct nav_mapper *); /* repeated, late or reordered */

@@ -11,8 +11,9 @@ enum { ROOM = NAV_JOINT_FACES + 2 * NAV_FACES_MOST };
 /* Constant errors of distances and turns, prior standard deviations. The scale of a map without a known length in it is
  * that of the odometry: a wide prior of distances would only make it drift. */
 static const double DISTANCE_SIGMA = 0.01, TURN_SIGMA = 0.03;
-static const float NEW_LEAST = 0.5F; /* of a reading of no contact, before it counts */
-static const double MISS = 0.2;      /* share of contacts that go unnoticed, about faces as the map has them */
+static const float NEW_LEAST = 0.5F;                     /* of a reading of no contact, before it counts */
+static const double SCALE_LEAST = 0.3, SCALE_MOST = 1.5; /* of the odometry's noise */
+static const double MISS = 0.2; /* share of contacts that go unnoticed, about faces as the map has them */
 
 int nav_particle_map_init(struct nav_particle_map *p, int classes)
 {
@@ -96,6 +97,11 @@ struct nav_pose nav_particle_map_pose(const struct nav_particle_map *p)
 {
     const double *m = p->joint.mean;
     return (struct nav_pose){m[NAV_JOINT_X], m[NAV_JOINT_Y], m[NAV_JOINT_HEADING]};
+}
+
+double nav_hypothesis_scale(int number)
+{
+    return SCALE_LEAST * pow(SCALE_MOST / SCALE_LEAST, number / (NAV_HYPOTHESES - 1.0));
 }
 
 size_t nav_particle_map_bytes(int classes)

@@ -6,6 +6,8 @@
 #include "floor.h"
 #include "record.h"
 
+enum { NAV_HYPOTHESES = 12 };
+
 struct nav_particle_map {
     struct nav_joint joint;
     struct nav_faces faces;
@@ -29,6 +31,9 @@ void nav_particle_map_copy(struct nav_particle_map *to, const struct nav_particl
 void nav_particle_map_take(struct nav_particle_map *, const struct nav_record *, const struct nav_record_row *);
 
 struct nav_pose nav_particle_map_pose(const struct nav_particle_map *);
+
+/* The scales of a mapper's hypotheses. */
+double nav_hypothesis_scale(int number);
 
 size_t nav_particle_map_bytes(int classes);
 

@@ -4,7 +4,6 @@
 
 static const double GATE = 12.0;        /* squared standard deviations */
 static const double FACING = 0.7;       /* cosine between the normals of a face and a segment of it */
-static const double AXES_KNOWN = 1.0;   /* rad^2 */
 static const double SEGMENT_HITS = 4.0; /* contacts that a segment counts for, at most */
 
 /* A segment as one of a face: how far its middle is off, how far it is turned. */
@@ -53,7 +52,7 @@ static void segment_match_face(const struct nav_face *g, const struct nav_joint 
 static double segment_off_axes(double turn, double variance)
 {
     double right = NAV_PI / 2.0;
-    return variance < AXES_KNOWN ? turn - right * round(turn / right) : turn;
+    return variance < NAV_JOINT_AXES_KNOWN ? turn - right * round(turn / right) : turn;
 }
 
 static void segment_match_axes(const struct nav_joint *j, const struct nav_touches_line *line, struct segment_match *m)
@@ -65,7 +64,7 @@ static void segment_match_axes(const struct nav_joint *j, const struct nav_touch
     double turn = j->mean[NAV_JOINT_HEADING] + line->normal - j->mean[NAV_JOINT_AXES];
     m->turn = segment_off_axes(turn, variance);
     variance += line->normal_var + NAV_FACE_RIGHT_RAD * NAV_FACE_RIGHT_RAD;
-    m->likelihood = variance > AXES_KNOWN ? 2.0 / NAV_PI : nav_face_normal_density(m->turn, variance) / 4.0;
+    m->likelihood = variance > NAV_JOINT_AXES_KNOWN ? 2.0 / NAV_PI : nav_face_normal_density(m->turn, variance) / 4.0;
 }
 
 static void segment_weigh(const struct nav_faces *f, const struct nav_joint *j, const struct nav_touches_line *line,

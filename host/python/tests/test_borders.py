@@ -20,7 +20,7 @@ import crunchbot
 from crunchbot.bridge.ring import FRAME, Writer
 from crunchbot.native import as_doubles, doubles, ffi, lib, octets
 from crunchbot.nav.filters import COMPONENT, Filter, Sensor, pack, prior_fault
-from crunchbot.nav.mapper import Mapper
+from crunchbot.nav.mapper import OneMap
 from crunchbot.planning.coverage import CoveragePlanner, Field, Vehicle
 from crunchbot.touch.contact import Contact
 from crunchbot.touch.contact_filter import ContactFilter
@@ -40,8 +40,8 @@ AROUND = {"cast", "from_buffer", "ctypes"}  # ways around the helpers
 # Functions that hand over only arrays of their own making.
 OWN = {
     "nav.filters.problem_of",
-    "nav.mapper.Mapper._grid",
-    "nav.mapper.Mapper._listed",
+    "nav.mapper.OneMap._grid",
+    "nav.mapper.OneMap._listed",
     "touch.radial.shape.terms_of",
     "signals.world.World.run",
     "signals.mechanics._counts",
@@ -103,8 +103,8 @@ CASES = {
     "nav.filters.pack": of_rows(
         lambda rows: pack(rows, OBSERVATIONS.texture.shape[1:], OBSERVATIONS.radial_m.shape[1], 0)
     ),
-    "nav.mapper.Mapper.replay": of_rows(
-        lambda rows: Mapper(SCENE.robot, SCENE.arena.textures).replay(rows, 0, len(rows))
+    "nav.mapper.OneMap.replay": of_rows(
+        lambda rows: OneMap(SCENE.robot, SCENE.arena.textures).replay(rows, 0, len(rows))
     ),
     "nav.filters._sensors": Case(
         lambda **table: Filter("odometry", SCENE, sensors=[Sensor(cell_m=0.1, levels=2, **table)]),

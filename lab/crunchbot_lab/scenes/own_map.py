@@ -7,7 +7,7 @@ import numpy as np
 from crunchbot.nav import localise
 from crunchbot.nav.mapping import Mapped
 from crunchbot.nav.scoring import lock_row, position_errors
-from crunchbot.occupancy import to_map
+from crunchbot.occupancy import from_map, to_map
 from crunchbot.scene import Arena, Prior, Scene
 
 from .families import recipe
@@ -60,21 +60,36 @@ def located(arena: Arena, made: Made, places: np.ndarray, seed: int) -> Located:
     return Located(lock, None if lock is None else float(np.median(distance[lock:])))
 
 
+@dataclass(frozen=True)
+class OwnMap:
+    """A map that was made, as an arena; the pose of its frame in the true one, and the median error of its poses."""
+
+    arena: Arena
+    origin: tuple[float, float, float]
+    error_m: float
+
+    @classmethod
+    def of(cls, mapped: Mapped) -> "OwnMap":
+        """By the rigid motion that fits the poses best to the truth of the rows."""
+        truth, poses, own = mapped.rows.truth, mapped.poses(), mapped.scene()
+        known = np.isfinite(poses).all(axis=1)
+        motion = best_motion(poses[known, :2], truth[known, :2])
+        off = np.hypot(*(motion.points(poses[known, :2]) - truth[known, :2]).T)
+        origin = to_map(np.array([own.origin]), (motion.x, motion.y, motion.turn))[0]
+        return cls(own.arena, tuple(map(float, origin)), float(np.median(off)))
+
+    def places(self, truth: np.ndarray) -> np.ndarray:
+        """(n, 2) of true poses (n, 3), in the map's frame."""
+        return from_map(truth, self.origin)[:, :2]
+
+
 def score(mapped: Mapped, family: str, seed: int, count: int = 1) -> list[Drive]:
     """`count` drives in the map of a family's scene, whose rows have true poses."""
-    truth, poses, own = mapped.rows.truth, mapped.poses(), mapped.scene()
-    known = np.isfinite(poses).all(axis=1)
-    origin = np.tile(np.array(own.origin), (1, 1))
-    poses, truth = poses[known], truth[known]
-    motion = best_motion(poses[:, :2], truth[:, :2])
-    map_error = float(np.median(np.hypot(*(motion.points(poses[:, :2]) - truth[:, :2]).T)))
-    true_arena = make_recipe(recipe(family), seed, 1).scene.arena
-    (x, y, turn) = to_map(origin, (motion.x, motion.y, motion.turn))[0]  # of the arena's frame in the true one
-    c, s = np.cos(turn), np.sin(turn)
+    own, true_arena = OwnMap.of(mapped), make_recipe(recipe(family), seed, 1).scene.arena
+    known = np.isfinite(mapped.poses()).all(axis=1)
     out = []
-    for made in drives(family, seed, truth[:, :2], count):
-        places = made.observations.truth[:, :2]
-        in_own = (places - [x, y]) @ np.array([[c, -s], [s, c]])
-        both = (located(own.arena, made, in_own, seed), located(true_arena, made, places, seed))
-        out.append(Drive(*both, map_error))
+    for made in drives(family, seed, mapped.rows.truth[known, :2], count):
+        truth = made.observations.truth
+        both = (located(own.arena, made, own.places(truth), seed), located(true_arena, made, truth[:, :2], seed))
+        out.append(Drive(*both, own.error_m))
     return out

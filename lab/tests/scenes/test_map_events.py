@@ -1,64 +1,71 @@
-"""Kidnaps while mapping: said when they are, not said when they are not, and judged right."""
+"""Kidnaps while mapping: noticed when they are, not said when they are not; the map of before is kept, and found again."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from mapkit import MANY, SEEDS, map_made, mapped
+from mapkit import MANY, SEEDS, mapped
 
-from crunchbot_lab.scenes import map_events, own_map
-from crunchbot_lab.scenes.map_scoring import best_motion
+from crunchbot import cli
+from crunchbot.nav import mapping
+from crunchbot.nav.mapper import Mapper, OneMap
+from crunchbot.nav.observations import stretch
+from crunchbot.scene import load
+from crunchbot_lab.scenes import map_scoring, own_map, write_scene
 
 ROWS, CARRIED = 3000, "free+carried"
-JOINED = 8  # of MANY scenes, in which both maps become one, at least
+NOTICED, FOUND = 8, 6  # of MANY scenes, at least
 
 
-def kidnaps(family: str, seeds: range) -> list[dict[str, float | None]]:
-    """The score of each scene's kidnaps."""
-    runs = [mapped(family, seed, ROWS) for seed in seeds]
-    return [map_events.kidnaps_score(run, made.kidnaps) for made, run in runs]
+def noticed():
+    """Scene, map and seed of those in which the kidnap was noticed."""
+    runs = [(*mapped(CARRIED, seed, ROWS), seed) for seed in MANY]
+    return [(made, run, seed) for made, run, seed in runs if len(run.parts) == 2 and run.parts[1].noticed >= 1500]
 
 
-def one_joined(family: str = CARRIED):
-    """The first scene whose maps were joined at the right place, and its map."""
-    found = (mapped(family, seed, ROWS) for seed in SEEDS)
-    return next((m, r) for m, r in found if map_events.kidnaps_score(r, m.kidnaps)["joined"] == 1.0)
+def test_a_kidnap_is_noticed():
+    runs = [(made.kidnaps[0], run.parts[1:]) for made, run in (mapped(CARRIED, seed, ROWS) for seed in MANY)]
+    late = [next((part.noticed - row for part in parts if part.noticed >= row), ROWS) for row, parts in runs]
+    assert sum(rows < ROWS for rows in late) >= NOTICED and np.median(late) < 300.0
+    assert not [part for row, parts in runs for part in parts if part.noticed < row]
 
 
-@pytest.fixture(scope="module")
-def carried():
-    return one_joined()
-
-
-def test_a_kidnap_is_noticed_and_both_maps_become_one():
-    found = kidnaps(CARRIED, MANY)
-    assert sum(score["joined"] for score in found) >= JOINED
-    assert sum(score["joined_false"] for score in found) <= 1.0
-    assert sum(score["alarms_false"] for score in found) == 0.0
-    assert np.median([score["noticed_rows"] or ROWS for score in found]) < 300.0
-
-
-def test_after_both_maps_became_one_poses_are_of_the_first(carried):
-    made, run = carried
-    part = run.parts[1]
-    assert part.into == 0 and part.first <= part.noticed <= part.joined
-    assert not run.frame.any() and run.touched.frame == 0
-    motion = best_motion(run.table["pose"][:1500, :2], made.observations.truth[:1500, :2])
-    off = np.hypot(*(motion.points(run.table["pose"][:, :2]) - made.observations.truth[:, :2]).T)
-    assert np.median(off[part.noticed :]) < 0.1
-
-
-def test_until_maps_meet_estimates_are_in_a_frame_of_their_own(carried):
-    made, whole = carried
-    rows, stop = made.observations, (whole.parts[1].noticed + whole.parts[1].joined) // 2
-    cut = {name: getattr(rows, name)[:stop] for name in ("t_s", "odometry", "texture", "radial_m", "truth")}
-    run = map_made(replace(made, observations=replace(rows, t_text=rows.t_text[:stop], **cut)))
-    assert len(run.parts) == 2 and run.parts[1].joined is None
-    assert run.touched.frame == 1 and run.frame[-1] == 1 and run.frame[0] == 0
+def test_a_new_map_begins_in_a_frame_of_its_own():
+    made, run, _ = noticed()[0]
+    old, new = run.parts
+    assert (old.number, old.first, new.number) == (0, 0, 1) and 1400 <= new.first <= new.noticed
+    assert run.touched.frame == 1 and not run.frame[: new.noticed].any() and run.frame[new.noticed :].all()
     known = np.isfinite(run.poses()).all(axis=1)
-    assert not known[:1500].any() and known[-1]
-    assert np.abs(run.table["pose"][-1, :2]).max() < 2.0  # near the new origin
-    assert run.scene().arena.size_m[0] < 4.0
+    assert not known[: new.noticed].any() and known[new.noticed :].all()
+    (before,) = run.before()
+    known = np.isfinite(before.poses()).all(axis=1)
+    assert known[: new.first].all() and not known[new.first :].any()
+    first, truth = made.kidnaps[0], made.observations.truth
+    assert map_scoring.trajectory(before.poses()[:first], truth[:first])["error_median_m"] < 0.1
+
+
+def test_a_map_that_is_lost_is_the_one_of_before_and_takes_no_more():
+    made, run, _ = noticed()[0]
+    rows, until = made.observations, run.parts[1].noticed + 1
+    one = OneMap(made.scene.robot, made.scene.arena.textures)
+    one.replay(rows, 0, until - 1)
+    assert one.lost is None
+    table, _ = one.replay(rows, until - 1, 11)
+    assert one.lost == (run.parts[1].first, run.parts[1].noticed)
+    assert (table["confidence"] == 0.0).all() and len(np.unique(table["pose"], axis=0)) == 1
+    assert np.array_equal(one.map().faces, run.parts[0].touched.faces)
+
+
+def test_rows_one_by_one_give_the_same_maps():
+    made, run, _ = noticed()[0]
+    mapper, rows = Mapper(made.scene.robot, made.scene.arena.textures), made.observations
+    poses = np.concatenate([mapper.replay(rows, row, 1)[0]["pose"] for row in range(ROWS)])
+    assert np.array_equal(poses, run.table["pose"])
+    for one, other in zip(mapper.parts(), run.parts, strict=True):
+        assert (one.first, one.noticed) == (other.first, other.noticed)
+        assert np.array_equal(one.touched.faces, other.touched.faces)
+    assert (mapper.bad_cells, mapper.bad_rows) == (run.bad_cells, run.bad_rows)
 
 
 @pytest.mark.parametrize(
@@ -76,17 +83,29 @@ def test_nothing_is_noticed_where_nobody_was_carried(family, most):
     assert sum(run.frame.any() for run in found) <= most
 
 
-def test_maps_that_fit_in_two_ways_are_not_joined():
-    assert sum(score["joined_false"] for score in kidnaps("symmetric2+carried", SEEDS)) == 0.0
+def test_the_old_place_is_found_in_the_map_that_was_kept(tmp_path):
+    """From the folder of the map before the kidnap, start unknown."""
+    near = 0
+    for made, run, seed in noticed():
+        mapping.write_map(tmp_path / str(seed), run)
+        own = own_map.OwnMap.of(run.before()[0])
+        assert load(tmp_path / str(seed) / "part-0").arena == own.arena
+        since = replace(made, observations=stretch(made.observations, made.kidnaps[0], ROWS))
+        found = own_map.located(own.arena, since, own.places(since.observations.truth), seed)
+        near += found.rows_to_lock is not None and found.error_m < 0.1
+    assert near >= FOUND
 
 
-def test_a_join_at_the_wrong_place_is_counted_as_false(carried):
-    made, run = carried
-    table = run.table.copy()
-    table["pose"][run.parts[1].joined :, 0] += 1.0
-    found = map_events.kidnaps_score(replace(run, table=table), made.kidnaps)
-    assert found["joined_false"] == 1.0 and found["joined"] == 0.0
-    assert map_events.kidnaps_score(run, (2900,))["alarms_false"] == 1.0
+def test_the_folder_says_when_and_the_command_too(tmp_path, capsys):
+    made, run, _ = noticed()[0]
+    write_scene(tmp_path / "scene", made.scene, made.observations)
+    assert cli.main(["map", str(tmp_path / "scene"), "--out", str(tmp_path / "map"), "--json"]) == 0
+    reported = json.loads(capsys.readouterr().out)
+    first, at = run.parts[1].first, run.parts[1].noticed
+    assert reported["parts"] == 2 and reported["lost_s"] == [round(float(made.observations.t_s[at]), 3)]
+    lines = (tmp_path / "map/parts.csv").read_text().splitlines()
+    assert lines == ["part,first_row,noticed_row", "0,0,0", f"1,{first},{at}"]
+    assert {"arena.toml", "faces.csv", "map.yaml"} <= {path.name for path in (tmp_path / "map/part-0").iterdir()}
 
 
 def test_a_drive_is_located_in_the_map_that_the_robot_made():

@@ -99,16 +99,17 @@ def test_what_the_command_writes_is_judged_as_the_mapper_itself(scene, mapped_fo
     assert free["free_right"] > 0.95 and free["solid_right"] > 0.8
 
 
-def test_an_occupancy_that_is_off_is_wrong(scene, mapped_folder):
-    arena, truth = scene.scene.arena, scene.observations.truth
-    mapped, cells = map_reading.read_map_folder(mapped_folder / "map", scene.scene, scene.observations)
-    motion = map_scoring.best_motion(mapped.table["pose"][:, :2], truth[:, :2])
-    right = map_scoring.cells_score(cells, motion, arena)
-    off = map_scoring.Motion(motion.turn, motion.x + 0.3, motion.y)
-    wrong = map_scoring.cells_score(cells, off, arena)
-    assert wrong["solid_right"] < right["solid_right"] - 0.1 and wrong["free_right"] < right["free_right"]
-    swapped = np.column_stack([cells[:, :2], 1.0 - cells[:, 2]])
-    assert map_scoring.cells_score(swapped, motion, arena)["free_right"] < 0.3
+def test_an_occupancy_that_is_off_is_wrong(scene, back):
+    arena = scene.scene.arena
+    sides = (np.arange(-0.0125, side + 0.025, 0.025) for side in arena.size_m)
+    middles = np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
+    solid = np.array([not arena.is_free(x, y, 0.0) for x, y in middles], float)
+    cells = np.column_stack([away(middles), solid])
+    assert map_scoring.cells_score(cells, back, arena) == {"solid_right": 1.0, "free_right": 1.0}
+    wrong = map_scoring.cells_score(cells, map_scoring.Motion(back.turn, back.x + 0.3, back.y), arena)
+    assert wrong["solid_right"] < 0.9 and wrong["free_right"] < 0.95
+    swapped = np.column_stack([cells[:, :2], 1.0 - solid])
+    assert map_scoring.cells_score(swapped, back, arena)["free_right"] == 0.0
 
 
 def test_rows_without_a_pose_are_carried_on_by_odometry(scene, mapped_folder, tmp_path):

@@ -19,10 +19,9 @@ void nav_course_begin(struct nav_course *t, long row)
 {
     nav_trail_clear(&t->trail);
     nav_cells_clear(&t->cells);
-    t->begun = t->row = row;
-    t->entered = (struct nav_pose){0.0, 0.0, 0.0};
+    t->row = row;
     t->patches = 0.0;
-    t->joined = false;
+    t->entered = false;
 }
 
 void nav_course_follow(struct nav_course *t, const struct nav_particle_map *map, const struct nav_record *r,
@@ -75,12 +74,9 @@ void nav_kept_copy(struct nav_kept *k, const struct nav_particle_map *map, const
     nav_particle_map_copy(&k->map, map);
     nav_trail_copy(&to->trail, &course->trail);
     nav_cells_copy(&to->cells, &course->cells);
-    to->begun = course->begun;
     to->row = course->row;
-    to->entered = course->entered;
     to->patches = course->patches;
-    to->joined = course->joined;
-    to->part = course->part;
+    to->entered = course->entered;
 }
 
 void nav_kept_take(struct nav_kept *k, const struct nav_record *r)
@@ -90,7 +86,7 @@ void nav_kept_take(struct nav_kept *k, const struct nav_record *r)
     nav_course_follow(&k->course, &k->map, r, &row);
 }
 
-void nav_kept_enter(struct nav_kept *k, long begun, struct nav_pose pose, double sigma_m, double sigma_rad)
+void nav_kept_enter(struct nav_kept *k, struct nav_pose pose, double sigma_m, double sigma_rad)
 {
     struct nav_joint *j = &k->map.joint;
     nav_joint_set(j, NAV_JOINT_X, pose.x, sigma_m * sigma_m);
@@ -100,7 +96,5 @@ void nav_kept_enter(struct nav_kept *k, long begun, struct nav_pose pose, double
     k->map.faces.loose = 0;
     k->map.evidence = 0.0;
     k->course.patches = nav_trail_patches(&k->course.trail, true);
-    k->course.begun = k->course.row = begun;
-    k->course.entered = pose;
-    k->course.joined = true;
+    k->course.entered = true;
 }

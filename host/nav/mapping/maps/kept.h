@@ -6,15 +6,13 @@
 #include "particle_map.h"
 #include "trail.h"
 
-/* What was read and felt along a path, which may have been entered anew somewhere: the robot was carried. */
+/* What was read and felt along a path. */
 struct nav_course {
     struct nav_trail trail;
     struct nav_cells cells;
-    long begun, row;         /* the first row of its last part; the first that it has not taken */
-    struct nav_pose entered; /* where the last part begins */
-    double patches;          /* log-likelihood of windows by patches before that */
-    bool joined;             /* of several parts */
-    int part;                /* of the run, in whose frame it is */
+    long row;       /* the first that it has not taken */
+    double patches; /* log-likelihood of windows by patches before it was entered anew */
+    bool entered;   /* anew, in the midst of its rows */
 };
 
 struct nav_kept {
@@ -33,7 +31,8 @@ void nav_course_begin(struct nav_course *, long row);
 void nav_course_follow(struct nav_course *, const struct nav_particle_map *map, const struct nav_record *,
                        const struct nav_record_row *);
 
-/* Log-likelihood of the rows of the last part by a map; textures are explained by patches where it has no lattice. */
+/* Log-likelihood of its rows, or of those since it was entered anew, by a map; textures are explained by patches where
+ * it has no lattice. */
 double nav_course_evidence(const struct nav_course *, const struct nav_particle_map *map);
 
 int nav_kept_init(struct nav_kept *, const struct nav_problem *);
@@ -44,7 +43,7 @@ void nav_kept_copy(struct nav_kept *, const struct nav_particle_map *, const str
 /* Takes its next row of the record. */
 void nav_kept_take(struct nav_kept *, const struct nav_record *);
 
-/* Goes on from row `begun`, at a pose that is known so well. */
-void nav_kept_enter(struct nav_kept *, long begun, struct nav_pose, double sigma_m, double sigma_rad);
+/* Goes on at a pose that is known so well. */
+void nav_kept_enter(struct nav_kept *, struct nav_pose, double sigma_m, double sigma_rad);
 
 #endif

@@ -169,7 +169,7 @@ struct nav_mapper_lattice nav_mapper_lattice(const struct nav_mapper *m)
     const struct nav_joint *j = &p->joint;
     const double *mean = j->mean, *cov = j->cov;
     int step = j->room + 1;
-    bool known = cov[NAV_JOINT_AXES * step] < NAV_MAPPER_AXES_KNOWN;
+    bool known = cov[NAV_JOINT_AXES * step] < NAV_JOINT_AXES_KNOWN;
     struct nav_mapper_lattice out = {.axes = known ? mean[NAV_JOINT_AXES] : (double)NAN};
     if (!p->floor.known)
         return out;
@@ -188,16 +188,4 @@ struct nav_mapper_lattice nav_mapper_lattice(const struct nav_mapper *m)
 double nav_mapper_tile(const struct nav_mapper *m, int column, int row, int *texture)
 {
     return nav_floor_sure(&nav_mapper_best(m)->floor, column, row, texture);
-}
-
-long nav_mapper_parts(const struct nav_mapper *m, struct nav_mapper_part *out, long room)
-{
-    for (long n = 0; n < room && n < m->kidnaps.parts; n++)
-        out[n] = m->kidnaps.part[n];
-    return m->kidnaps.parts;
-}
-
-int nav_mapper_frame(const struct nav_mapper *m)
-{
-    return m->course.part;
 }

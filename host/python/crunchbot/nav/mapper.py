@@ -3,8 +3,9 @@
 Everything is in the frame of the first pose: x forward, y left of the robot as it stood then.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..errors import UserError
 from ..native import doubles, ffi, floats, lib, pointer
 from ..scene import Arena, Robot, Scene
 from .filters import ESTIMATE, ESTIMATES, pack, problem_of
-from .observations import Observations
+from .observations import Observations, joined, stretch
 
 FACE = np.dtype(
     [(name, "f8") for name in ("x0", "y0", "x1", "y1", "normal", "normal_sigma", "offset_sigma", "hits")]
@@ -24,6 +25,7 @@ FACES, CORNERS = ffi.typeof("struct nav_mapper_face[]"), ffi.typeof("struct nav_
 assert FACE.itemsize == ffi.sizeof("struct nav_mapper_face")
 assert CORNER.itemsize == ffi.sizeof("struct nav_mapper_corner")
 PATCH_M = 0.3
+AGAIN_MOST = 2000  # rows that a new map takes of those before, at most: NAV_KIDNAP_AGAIN
 TILES_EACH_WAY = 24  # of the lattice's first tile: host/nav/mapping/floor.h
 
 
@@ -45,21 +47,6 @@ class Lattice:
 
 
 @dataclass(frozen=True)
-class Part:
-    """A part of the run between two kidnaps: the robot was carried off before row `first`, noticed at row `noticed`. Its
-    poses are in a frame of its own, whose origin is the first of them, until it was joined at row `joined` with part
-    `into`, in whose frame that origin is at `place` (x, y m, theta rad); None: it was not. A part that is noticed and
-    joined in one row was found in the map of the part before."""
-
-    number: int
-    first: int
-    noticed: int
-    joined: int | None
-    into: int | None
-    place: tuple[float, float, float] | None
-
-
-@dataclass(frozen=True)
 class Grid:
     """Square cells of `cell` m along the first pose's axes, the lower left corner of them all at (`x`, `y`), m. `occupied`:
     (rows, columns) probability that something solid is there, the lowest y first; 0.5: nothing is known."""
@@ -75,8 +62,7 @@ class TouchMap:
     """What is believed of the world. `faces`: (n,) of FACE, stretches that were felt; `axes`: direction of their right
     angles, rad, None: not known; `lattice`: None where the evidence is for none. `tiles`: (column, row) of the lattice to
     (index of its likeliest texture, probability). `corners`: (n,) of CORNER, where faces meet, m, with covariance, m^2.
-    `frame`: number of the part of the run (Mapper.parts)
-    whose first pose is the origin.
+    `frame`: number of the part of the run (Mapper.parts) whose first pose is the origin.
     """
 
     faces: np.ndarray
@@ -88,8 +74,19 @@ class TouchMap:
     frame: int = 0
 
 
-class Mapper:
-    """Takes rows of observations and knows, after each, the pose and the map."""
+@dataclass(frozen=True)
+class Part:
+    """A part of a run, from row `first`, before which the robot was carried off; that was noticed at row `noticed`. `touched`:
+    its map, in a frame of its own, whose origin is its first pose. The first part begins at row 0."""
+
+    number: int
+    first: int
+    noticed: int
+    touched: TouchMap
+
+
+class OneMap:
+    """Takes rows of observations and knows, after each, the pose and the map; or that it is lost, for good."""
 
     def __init__(
         self,
@@ -128,23 +125,14 @@ class Mapper:
         axes, lattice = lib.nav_mapper_lattice(self._mapper).axes, self.lattice()
         tiles = dict(self._tiles()) if lattice else {}
         known = None if axes != axes else float(axes)
-        return TouchMap(self.faces(), known, lattice, tiles, corners, self._grid(), self.frame)
-
-    def parts(self) -> list[Part]:
-        """What the run fell into so far; one part where the robot was never carried off."""
-        count = lib.nav_mapper_parts(self._mapper, ffi.NULL, 0)
-        found = ffi.new("struct nav_mapper_part[]", count)
-        lib.nav_mapper_parts(self._mapper, found, count)
-        out = []
-        for p in found:
-            joined = (int(p.joined), int(p.into), (p.place.x, p.place.y, p.place.theta))
-            out.append(Part(p.number, p.first, p.noticed, *(joined if p.joined >= 0 else (None, None, None))))
-        return out
+        return TouchMap(self.faces(), known, lattice, tiles, corners, self._grid())
 
     @property
-    def frame(self) -> int:
-        """Number of the part in whose frame the last estimate and the map are."""
-        return int(lib.nav_mapper_frame(self._mapper))
+    def lost(self) -> tuple[int, int] | None:
+        """Of the rows taken, from 0: before which one the robot was carried off, and at which that was noticed; None: it was
+        not. The map is then that of before, and no more rows are taken."""
+        lost = lib.nav_mapper_lost(self._mapper)
+        return (int(lost.first), int(lost.noticed)) if lost.first >= 0 else None
 
     def faces(self) -> np.ndarray:
         """(n,) of FACE, stretches that were felt."""
@@ -176,12 +164,70 @@ class Mapper:
                     yield (column, row), (int(texture[0]), float(sure))
 
     @property
+    def bad(self) -> np.ndarray:
+        """Cells and rows that were not taken."""
+        return np.array([lib.nav_mapper_bad_cells(self._mapper), lib.nav_mapper_bad_rows(self._mapper)])
+
+
+class Mapper:
+    """The maps of a run, one after the other: where the robot turns out to have been carried off, a new one begins at the row
+    since which it was."""
+
+    def __init__(self, robot: Robot, textures: tuple[str, ...], lattice: bool = True, normals: bool = False):
+        """As OneMap."""
+        self._begin = lambda: OneMap(robot, textures, lattice, normals)
+        self._map, self._past = self._begin(), list[Part]()
+        self._first = self._noticed = self._taken = 0
+        self._last, self._kept = deque[Observations](), 0  # the newest rows, and how many there are
+        self._bad = np.zeros(2, int)  # beside those of the map
+
+    def replay(self, rows: Observations, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """As OneMap's. A row's estimate is in the frame of the part that it was noticed to be of by then."""
+        table, step_us = self._map.replay(rows, first, count)
+        self._last.append(stretch(rows, first, first + count))
+        self._taken, self._kept = self._taken + count, self._kept + count
+        if self._map.lost:
+            again, again_us = self._begin_anew(*self._map.lost)
+            known = max(self._noticed - (self._taken - count), 0)  # rows of `table` that count
+            late = len(again) - (count - known)
+            table[known:], step_us[known:] = again[late:], again_us[late:]
+            step_us[known] += again_us[:late].sum()
+        while self._kept - len(self._last[0]) >= AGAIN_MOST:
+            self._kept -= len(self._last.popleft())
+        return table, step_us
+
+    def _begin_anew(self, first: int, noticed: int) -> tuple[np.ndarray, np.ndarray]:
+        """A new map, of all rows since `first`; what it answers to these."""
+        self._past.append(Part(self.frame, self._first, self._noticed, self.map()))
+        self._noticed, self._first = self._first + noticed, self._first + first
+        rows, begun, bad = joined(self._last), self._first - (self._taken - self._kept), self._map.bad
+        self._map = self._begin()
+        until = self._noticed + 1 - self._first
+        old = self._map.replay(rows, begun, until)
+        self._bad += bad - self._map.bad
+        new = self._map.replay(rows, begun + until, len(rows) - begun - until)
+        return tuple(np.concatenate(column) for column in zip(old, new, strict=True))
+
+    @property
+    def frame(self) -> int:
+        """Number of the part in whose frame the last estimate and the map are."""
+        return len(self._past)
+
+    def map(self) -> TouchMap:
+        """The map after the last row: cheap enough for once a second."""
+        return replace(self._map.map(), frame=self.frame)
+
+    def parts(self) -> tuple[Part, ...]:
+        """What the run fell into so far; one part where the robot was never carried off."""
+        return (*self._past, Part(self.frame, self._first, self._noticed, self.map()))
+
+    @property
     def bad_cells(self) -> int:
-        return lib.nav_mapper_bad_cells(self._mapper)
+        return int(self._bad[0] + self._map.bad[0])
 
     @property
     def bad_rows(self) -> int:
-        return lib.nav_mapper_bad_rows(self._mapper)
+        return int(self._bad[1] + self._map.bad[1])
 
 
 def nowhere(textures: tuple[str, ...]) -> Arena:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..occupancy import FREE, SOLID, Pose, from_map, to_map
+from ..occupancy import FREE, SOLID, Pose, from_map
 from ..progress import bar
 from ..scene import OBSERVATIONS, Arena, Prior, Robot, Scene, load_robot, write
 from ..tables import TableError, read_rows, unwritable
@@ -18,6 +18,7 @@ from .observations import Observations, read_observations
 
 CHUNK = 100  # rows between two steps of the progress bar
 FACES, TILES, CORNERS, PARTS = "faces.csv", "tiles.csv", "corners.csv", "parts.csv"
+PART = "part-{}"  # folder of the map of a part before the last
 ESTIMATES, IMAGE, MAP, CELLS = "est.csv", "map.png", "map.yaml", "occupancy.npy"
 START_SIGMA = (0.02, 0.02, 0.03)  # of the first pose in prior.toml: m, m, rad
 GREYS = {FREE: 254, SOLID: 0}  # of ROS; any other cell is 205
@@ -27,8 +28,8 @@ GREY_UNKNOWN = 205
 @dataclass(frozen=True)
 class Mapped:
     """A run over all rows: the estimates (n,) of ESTIMATE, each from the rows until then, and what is left at its end.
-    `frame` (n,): the part of the run in whose frame an estimate is. Those of a part that was joined with another are in
-    the other's frame, moved there afterwards; without kidnaps all are in that of the first pose, 0."""
+    `frame` (n,): the part of the run in whose frame an estimate is; `touched`: the map of the last part, or of the one asked
+    for."""
 
     robot: Robot
     textures: tuple[str, ...]
@@ -42,13 +43,16 @@ class Mapped:
     frame: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
     def poses(self) -> np.ndarray:
-        """(n, 3) in the frame of the map; nan where a row's is not known in it: before an unjoined kidnap, and from a
-        kidnap until it was noticed."""
+        """(n, 3) in the frame of `touched`; nan for rows of other parts, and from a kidnap until it was noticed."""
         out = self.table["pose"].copy()
         out[self.frame != self.touched.frame] = np.nan
         for part in self.parts[1:]:
             out[part.first : part.noticed] = np.nan
         return out
+
+    def before(self) -> list["Mapped"]:
+        """The same with the map of each part before the last."""
+        return [replace(self, touched=part.touched) for part in self.parts[:-1]]
 
     def scene(self) -> MapScene:
         return map_scene(self.touched, self.poses(), self.rows, self.robot, self.textures)
@@ -101,64 +105,67 @@ def left_by(
     mapper: Mapper, robot: Robot, textures: tuple[str, ...], rows: Observations, table: np.ndarray, step_us: np.ndarray
 ) -> Mapped:
     """What a mapper has made of rows: `table` (n,) of ESTIMATE, as it gave them."""
-    parts, table = tuple(mapper.parts()), table.copy()
-    frame = _joined(table, parts)
-    left = (mapper.map(), mapper.bad_cells, mapper.bad_rows)
+    parts, frame = mapper.parts(), np.zeros(len(table), int)
+    for part in parts[1:]:
+        frame[part.noticed :] = part.number
+    left = (parts[-1].touched, mapper.bad_cells, mapper.bad_rows)
     return Mapped(robot, textures, rows, table, step_us, *left, parts, frame)
 
 
-def _joined(table: np.ndarray, parts: tuple[Part, ...]) -> np.ndarray:
-    """Moves estimates of joined parts into the frames of those that they were joined with. (n,) part of each frame."""
-    frame = np.zeros(len(table), int)
-    for part in parts[1:]:
-        frame[max(part.noticed - 1, 0) : None if part.joined is None else part.joined - 1] = part.number
-    for part in sorted((p for p in parts if p.place is not None), key=lambda p: p.joined):
-        rows = (frame == part.number) & (np.arange(len(table)) < part.joined)
-        x, y, turn = part.place
-        c, s = math.cos(turn), math.sin(turn)
-        turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        table["pose"][rows] = to_map(table["pose"][rows], (x, y, turn))
-        table["covariance"][rows] = turned @ table["covariance"][rows] @ turned.T
-        frame[rows] = part.into
-    return frame
-
-
 def write_map(folder: str | Path, mapped: Mapped) -> MapScene:
-    """Write arena.toml, robot.toml, prior.toml, tables of faces, corners, tiles, parts and estimates, map.png,
-    map.yaml and occupancy.npy; TableError when it cannot be."""
-    folder, made = Path(folder), mapped.scene()
-    start = from_map(np.zeros((1, 3)), made.origin)[0]
-    prior = Prior("gaussian", tuple(float(v) for v in start), START_SIGMA)
+    """Write the map of the last part, tables of parts and estimates, and each map before it to a folder of its own in there.
+    TableError when it cannot be."""
+    folder = Path(folder)
     try:
-        write(folder, Scene(made.arena, mapped.robot, prior))
-        _write_tables(folder, mapped, made)
-        _write_image(folder, made)
+        made = _write_one(folder, mapped)
+        for earlier in mapped.before():
+            _write_one(folder / PART.format(earlier.touched.frame), earlier)
+        _write_table(folder / ESTIMATES, _estimates(mapped))
+        _write_table(folder / PARTS, _parts(mapped))
     except OSError as error:
         raise unwritable(folder, error) from error
     return made
 
 
-def _write_tables(folder: Path, mapped: Mapped, made: MapScene) -> None:
-    touched = mapped.touched
-    faces = ["x0_m,y0_m,x1_m,y1_m,normal_rad,normal_sd_rad,offset_sd_m,contacts,right"]
+def _write_one(folder: Path, mapped: Mapped) -> MapScene:
+    """arena.toml, robot.toml, prior.toml, tables of faces, corners and tiles, map.png, map.yaml and occupancy.npy."""
+    made = mapped.scene()
+    start = from_map(np.zeros((1, 3)), made.origin)[0]
+    write(folder, Scene(made.arena, mapped.robot, Prior("gaussian", tuple(float(v) for v in start), START_SIGMA)))
+    _write_table(folder / FACES, _faces(mapped.touched, made.origin))
+    _write_table(folder / CORNERS, _corners(mapped.touched, made.origin))
+    _write_table(folder / TILES, _tiles(mapped))
+    _write_image(folder, made)
+    return made
+
+
+def _write_table(path: Path, lines: list[str]) -> None:
+    path.write_text("\n".join(lines) + "\n")
+
+
+def _faces(touched: TouchMap, origin: Pose) -> list[str]:
+    lines = ["x0_m,y0_m,x1_m,y1_m,normal_rad,normal_sd_rad,offset_sd_m,contacts,right"]
     for face in touched.faces:
-        ends = from_map(
-            np.array([[face["x0"], face["y0"], face["normal"]], [face["x1"], face["y1"], 0.0]]), made.origin
-        )
+        ends = from_map(np.array([[face["x0"], face["y0"], face["normal"]], [face["x1"], face["y1"], 0.0]]), origin)
         place = (*ends[0, :2], *ends[1, :2], ends[0, 2], face["normal_sigma"], face["offset_sigma"])
-        faces.append(",".join(f"{v:.6f}" for v in place) + f",{face['hits']:.0f},{face['right']}")
-    tiles = ["column,row,texture,probability"]
-    tiles += [f"{column},{row},{mapped.textures[k]},{p:.6f}" for (column, row), (k, p) in sorted(touched.tiles.items())]
-    poses = ["t_s,x_m,y_m,theta_rad,confidence,xx_m2,xy_m2,yy_m2,part"]
-    table = mapped.table
+        lines.append(",".join(f"{v:.6f}" for v in place) + f",{face['hits']:.0f},{face['right']}")
+    return lines
+
+
+def _tiles(mapped: Mapped) -> list[str]:
+    tiles = sorted(mapped.touched.tiles.items())
+    rows = [f"{column},{row},{mapped.textures[k]},{p:.6f}" for (column, row), (k, p) in tiles]
+    return ["column,row,texture,probability", *rows]
+
+
+def _estimates(mapped: Mapped) -> list[str]:
+    lines, table = ["t_s,x_m,y_m,theta_rad,confidence,xx_m2,xy_m2,yy_m2,part"], mapped.table
     cells = (mapped.rows.t_text, table["pose"], table["confidence"], table["covariance"], mapped.frame)
     for t_s, pose, sure, cov, part in zip(*cells, strict=True):
         numbers = (*pose, sure)
         spread = (cov[0, 0], cov[0, 1], cov[1, 1])
-        poses.append(",".join([t_s, *(f"{v:.6f}" for v in numbers), *(f"{v:.4g}" for v in spread), str(part)]))
-    named = ((FACES, faces), (TILES, tiles), (ESTIMATES, poses), (CORNERS, _corners(touched, made.origin)))
-    for name, lines in (*named, (PARTS, _parts(mapped))):
-        (folder / name).write_text("\n".join(lines) + "\n")
+        lines.append(",".join([t_s, *(f"{v:.6f}" for v in numbers), *(f"{v:.4g}" for v in spread), str(part)]))
+    return lines
 
 
 def _corners(touched: TouchMap, origin: Pose) -> list[str]:
@@ -172,13 +179,8 @@ def _corners(touched: TouchMap, origin: Pose) -> list[str]:
 
 
 def _parts(mapped: Mapped) -> list[str]:
-    lines = ["part,first_row,noticed_row,joined_row,into,x_m,y_m,theta_rad"]
-    for part in mapped.parts:
-        joined = (
-            ("", "", "", "", "") if part.place is None else (part.joined, part.into, *map("{:.6f}".format, part.place))
-        )
-        lines.append(",".join(map(str, (part.number, part.first, part.noticed, *joined))))
-    return lines
+    rows = [f"{part.number},{part.first},{part.noticed}" for part in mapped.parts]
+    return ["part,first_row,noticed_row", *rows]
 
 
 def _write_image(folder: Path, made: MapScene) -> None:
@@ -208,7 +210,7 @@ def summary(mapped: Mapped, made: MapScene) -> dict:
         "step_us_p99": round(float(np.quantile(us, 0.99)), 1),
         "peak_bytes": int(mapped.table["bytes"].max()) if len(mapped.table) else 0,
         "parts": len(mapped.parts),
-        "joined": sum(part.joined is not None for part in mapped.parts),
+        "lost_s": [round(float(mapped.rows.t_s[part.noticed]), 3) for part in mapped.parts[1:]],
         "bad_cells": mapped.bad_cells,
         "bad_rows": mapped.bad_rows,
     }

@@ -47,6 +47,13 @@ def joined(parts: Sequence[Observations]) -> Observations:
     return Observations(t_text=text, **{name: column(name) for name in names})
 
 
+def stretch(rows: Observations, first: int, last: int) -> Observations:
+    """Rows `first` to `last`, that one not among them; without a copy."""
+    names = (field.name for field in fields(Observations))
+    cut = {name: value if (value := getattr(rows, name)) is None else value[first:last] for name in names}
+    return Observations(**cut)
+
+
 def observations_path(folder: str | Path) -> Path:
     return Path(folder) / OBSERVATIONS
 

@@ -71,7 +71,7 @@ class MapperProcess:
         self._tables: list[np.ndarray] = []
         self._steps_us: list[np.ndarray] = []
         self._now_ns = self._map_due_ns = self._belief_due_ns = 0
-        self._seq, self._touched, self._prior = 0, None, ORIGIN
+        self._seq, self._touched, self._prior, self._lost_at = 0, None, ORIGIN, ""
 
     def counters(self) -> dict[str, object]:
         """What has been counted so far; rows unless said otherwise."""
@@ -80,6 +80,7 @@ class MapperProcess:
         reported |= {"first": follower.first_seq, "refused": self._inbox.refused, "overflown": self._inbox.overflown}
         if self._mapper:
             reported |= {"bad_cells": self._mapper.bad_cells, "bad_rows": self._mapper.bad_rows}
+            reported |= {"lost": self._mapper.frame}
         if self._touched:
             faces = len({int(n) for n in self._touched.faces["face"]})
             reported |= {"faces": faces, "tiles": len(self._touched.tiles)}
@@ -112,7 +113,7 @@ class MapperProcess:
         return self.counters()
 
     def _last_error(self) -> str:
-        return self._inbox.last_error or self._journal.note
+        return self._inbox.last_error or self._journal.note or self._lost_at
 
     def _recall(self) -> None:
         """Takes the rows of the journal again, without a word about each."""
@@ -150,7 +151,10 @@ class MapperProcess:
             normals = has_normals(step.row.names)
             self._mapper = Mapper(self._robot, self._scene.arena.textures, normals=normals)
         taken = joined([observed(row, self._scene) for row in rows])
+        part, t_s = self._mapper.frame, float(taken.t_s[-1])
         table, step_us = self._mapper.replay(taken, 0, len(taken))
+        if self._mapper.frame != part:
+            self._lost_at = f"lost at {t_s:.1f} s: the robot was carried off; a new map began"
         self._rows.append(taken)
         self._tables.append(table)
         self._steps_us.append(step_us)
