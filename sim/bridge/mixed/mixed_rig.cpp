@@ -48,8 +48,12 @@ void MixedRig::arm(WireFault fault)
     RtlRig::arm(fault);
 }
 
+// The host's frames are numbered on.
 void MixedRig::power_up()
 {
+    if (at_bytes_) {
+        host_.set_microframe(microframe_);
+    }
     at_bytes_ = false;
     quiet_ = 0;
     RtlRig::power_up();

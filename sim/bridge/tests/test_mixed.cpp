@@ -1,5 +1,5 @@
-// Levels mixed in one run against RTL alone: the same fields, faults, orders and stops; every byte that the host
-// receives is the same. `test_bridge_mixed SEEDS` for more.
+// Levels mixed in one run against RTL alone: the same fields, faults, orders, settings, stops, pauses of the host, bus
+// resets and losses of power; every byte that the host receives is the same. `test_bridge_mixed SEEDS` for more.
 #include <cstdlib>
 
 #include "cmocka_cpp.h"
@@ -13,18 +13,20 @@ using namespace bridge_sim;
 
 constexpr size_t POPULATED = 6, TRANSFERS = 4, TRANSFER_BYTES = 4096;
 constexpr uint64_t RTL_TICKS = 300, TICKS = 6000;
+constexpr uint64_t PAUSE_TICKS = 100; // more than FIFO and endpoint hold
+constexpr uint32_t ALL_LANES = UINT32_MAX >> (32 - LANES);
 constexpr uint8_t SET_TYPE = 0x21, SET_REPORT = 9, GET_TYPE = 0xA1, GET_REPORT = 1;
 constexpr uint16_t FEATURE = 0x0300;
 
-uint64_t seeds = 2;
+uint64_t seeds = 4;
 
 // A host and a bridge: what it received, as text.
 class Side
 {
   public:
-    Side(Level level, uint64_t seed)
+    Side(Level level, uint64_t seed, const std::optional<FaultPlan> &plan)
         : rig_(make_rig(level, POPULATED, seed, {}, RTL_TICKS)), scheduler_(*rig_), log_("", ""),
-          runner_(*rig_, scheduler_, FaultPlan(seed, POPULATED, TICKS), log_)
+          runner_(*rig_, scheduler_, plan, log_)
     {
         Descriptors descriptors;
         const char *error = nullptr;
@@ -39,7 +41,7 @@ class Side
         scheduler_.submit(std::move(urb));
     }
 
-    void run(bool on, uint8_t options)
+    void run(bool on, uint8_t options, uint32_t lane_mask)
     {
         Bytes report(WHISKER_REPORT_CONTROL_BYTES);
         report[WHISKER_REPORT_CONTROL_ID] = WHISKER_REPORT_ID_CONTROL;
@@ -49,7 +51,7 @@ class Side
         report[WHISKER_REPORT_CONTROL_WORD_GAP] = WHISKER_LIMIT_WORD_GAP_MIN;
         report[WHISKER_REPORT_CONTROL_SAMPLE_POINT] = WHISKER_LIMIT_SCK_DIVIDER_MIN - 1;
         report[WHISKER_REPORT_CONTROL_OPTIONS] = options;
-        whisker_put_u32(&report[WHISKER_REPORT_CONTROL_LANE_MASK], UINT32_MAX >> (32 - LANES));
+        whisker_put_u32(&report[WHISKER_REPORT_CONTROL_LANE_MASK], lane_mask);
         whisker_put_u32(&report[WHISKER_REPORT_CONTROL_TICK_PERIOD], WHISKER_LIMIT_TICK_PERIOD);
         request(SET_TYPE, SET_REPORT, report, WHISKER_REPORT_ID_CONTROL, WHISKER_REPORT_CONTROL_BYTES);
         settle();
@@ -57,24 +59,48 @@ class Side
 
     void tick(uint64_t number, const sim_field *fields)
     {
-        while (submitted_ < TRANSFERS) {
-            Urb urb;
-            urb.kind = UrbKind::BULK_IN;
-            urb.length = TRANSFER_BYTES;
-            scheduler_.submit(std::move(urb));
-            submitted_++;
-        }
-        while (!runner_.ready()) {
+        offer();
+        while (!pausing_ && !runner_.ready()) {
             settle();
+            offer();
         }
         runner_.tick(number, fields);
         rtl_ticks_ += rig_->at_rtl();
         take();
     }
 
+    // Of these three each takes what is due first: the levels take it at different moments of a tick.
+    void pause(bool pausing)
+    {
+        settle();
+        pausing_ = pausing;
+        scheduler_.stay_away(pausing);
+    }
+
+    void bus_reset()
+    {
+        settle();
+        Urb urb;
+        urb.kind = UrbKind::BUS_RESET;
+        scheduler_.submit(std::move(urb));
+        settle();
+    }
+
+    void power_cycle()
+    {
+        settle();
+        scheduler_.plug(false);
+        runner_.unplugged();
+        take();
+        Descriptors descriptors;
+        const char *error = nullptr;
+        assert_true(rig_->power_cycle(descriptors, error));
+        scheduler_.plug(true);
+    }
+
     void end(const sim_field *fields)
     {
-        run(false, 0);
+        run(false, 0, ALL_LANES);
         runner_.last_tick(fields);
         settle();
         request(GET_TYPE, GET_REPORT, {}, WHISKER_REPORT_ID_COUNTERS, 255);
@@ -106,6 +132,17 @@ class Side
     }
 
   private:
+    void offer()
+    {
+        while (submitted_ < TRANSFERS) {
+            Urb urb;
+            urb.kind = UrbKind::BULK_IN;
+            urb.length = TRANSFER_BYTES;
+            scheduler_.submit(std::move(urb));
+            submitted_++;
+        }
+    }
+
     void take()
     {
         for (const Urb &urb : scheduler_.take_completed()) {
@@ -124,24 +161,42 @@ class Side
     std::string frames_, answers_;
     size_t submitted_ = 0;
     uint64_t rtl_ticks_ = 0;
+    bool pausing_ = false;
 };
 
 class Pair
 {
   public:
-    explicit Pair(uint64_t seed) : sides_{Side(Level::RTL, seed), Side(Level::MIXED, seed)}, draw_(seed)
+    // Odd seeds draw faults. Even ones have a host that pauses, resets the bus or loses the device: not both, for while
+    // a fault keeps the host away it cannot take what is due first.
+    explicit Pair(uint64_t seed)
+        : faults_(seed % 2), plan_(faults_ ? std::optional(FaultPlan(seed, POPULATED, TICKS)) : std::nullopt),
+          sides_{Side(Level::RTL, seed, plan_), Side(Level::MIXED, seed, plan_)}, draw_(seed)
     {
     }
 
-    // Two runs, the second one with other options; each with orders to the nodes now and then.
+    // Runs of all options, each disturbed in another way in its midst, with orders to the nodes now and then.
     void run()
     {
+        static constexpr struct {
+            uint8_t options;
+            uint32_t lane_mask;
+            void (Side::*disturb)();
+        } RUNS[] = {{0, ALL_LANES, nullptr},
+                    {WHISKER_CONTROL_OPTION_EVERY_FRAME, 0x0F00015, &Side::bus_reset},
+                    {WHISKER_CONTROL_OPTION_PATTERN, ALL_LANES ^ 2, &Side::power_cycle}};
         uint64_t number = 0;
-        for (const uint8_t options : {uint8_t{0}, uint8_t{WHISKER_CONTROL_OPTION_EVERY_FRAME}}) {
-            both([options](Side &side) { side.run(true, options); });
-            for (const uint64_t until = number + TICKS / 2; number < until; number++) {
-                one_tick(number);
+        for (const auto &run : RUNS) {
+            const auto start = [&run](Side &side) { side.run(true, run.options, run.lane_mask); };
+            both(start);
+            ticks(number, TICKS / 6);
+            if (run.disturb && !faults_) {
+                both([&run](Side &side) { (side.*run.disturb)(); });
+                both(start);
+            } else {
+                both([](Side &side) { side.run(true, WHISKER_CONTROL_OPTION_PATTERN, 3); });
             }
+            ticks(number, TICKS / 6);
             both([this](Side &side) { side.end(fields_.data()); });
             assert_true(sides_[0].frames() == sides_[1].frames());
             assert_true(sides_[0].answers() == sides_[1].answers());
@@ -158,6 +213,16 @@ class Pair
     {
         for (Side &side : sides_) {
             action(side);
+        }
+    }
+
+    void ticks(uint64_t &number, uint64_t count)
+    {
+        for (const uint64_t until = number + count; number < until; number++) {
+            if (!faults_ && (until - number == 2 * PAUSE_TICKS || until - number == PAUSE_TICKS)) {
+                both([pausing = until - number > PAUSE_TICKS](Side &side) { side.pause(pausing); });
+            }
+            one_tick(number);
         }
     }
 
@@ -181,6 +246,8 @@ class Pair
         both([this, number](Side &side) { side.tick(number, fields_.data()); });
     }
 
+    bool faults_;
+    std::optional<FaultPlan> plan_;
     Side sides_[2];
     std::array<sim_field, LANES> fields_{};
     std::mt19937_64 draw_;
