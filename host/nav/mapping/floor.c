@@ -138,7 +138,7 @@ static void floor_look(const struct nav_floor *f, const struct nav_joint *j, dou
     v->across_row = axis ? v->row - step : v->row;
 }
 
-void nav_floor_forget(struct nav_floor *f)
+static void floor_forget(struct nav_floor *f)
 {
     memset(f->tile, 0, (size_t)NAV_FLOOR_SIDE * NAV_FLOOR_SIDE * (size_t)f->classes * sizeof *f->tile);
     f->agreement = 0.0;
@@ -150,7 +150,7 @@ static double floor_agree(struct nav_floor *f, double log_likelihood)
     f->evidence += log_likelihood;
     f->agreement += (log_likelihood - f->agreement) / AGREEMENT_WINDOWS;
     if (f->agreement < AGREEMENT_LEAST)
-        nav_floor_forget(f);
+        floor_forget(f);
     return log_likelihood;
 }
 
@@ -204,7 +204,7 @@ void nav_floor_adopt(struct nav_floor *f, struct nav_joint *j, const struct nav_
     f->x = l->x;
     f->y = l->y;
     f->evidence = 0.0;
-    nav_floor_forget(f);
+    floor_forget(f);
     nav_joint_set(j, NAV_JOINT_LATTICE_U, l->u, l->sigma_m * l->sigma_m);
     nav_joint_set(j, NAV_JOINT_LATTICE_V, l->v, l->sigma_m * l->sigma_m);
     nav_joint_set(j, NAV_JOINT_PITCH, l->pitch, l->sigma_pitch * l->sigma_pitch);

@@ -34,9 +34,6 @@ void nav_floor_at(const struct nav_floor *, const struct nav_joint *, double x, 
 /* Takes over a lattice, whose tiles are not known. right: it stands along the world's right angles. */
 void nav_floor_adopt(struct nav_floor *, struct nav_joint *, const struct nav_lattice *, bool right);
 
-/* The textures of all tiles are not known any more; the lattice is. */
-void nav_floor_forget(struct nav_floor *);
-
 /* Probability of the likeliest texture of a tile, and which; 0 beyond the lattice and where nothing was read. */
 double nav_floor_sure(const struct nav_floor *, int column, int row, int *texture);
 

@@ -92,10 +92,10 @@ static long kidnap_split(struct nav_kidnap *k, const struct nav_kidnap_view *v)
     return best;
 }
 
-/* How rows go on in the calm map: at the pose that it believes, known so well. */
+/* How rows go on in the calm map: at the pose that it believes, known so well, with its tiles or without. */
 struct kidnap_entry {
     double sigma_m, sigma_rad;
-    enum { TILES_AS_MAPPED, TILES_RENAMED, NO_TILES } floor;
+    bool tiles;
 };
 
 static double kidnap_try_at(struct nav_kidnap *k, const struct nav_kidnap_view *v, const struct kidnap_entry *entry,
@@ -103,9 +103,7 @@ static double kidnap_try_at(struct nav_kidnap *k, const struct nav_kidnap_view *
 {
     nav_kept_copy(&k->tried, &k->calm.map, &k->calm.course);
     k->tried.map.scale = scale;
-    k->tried.map.floor.known &= entry->floor != NO_TILES;
-    if (entry->floor == TILES_RENAMED)
-        nav_floor_forget(&k->tried.map.floor);
+    k->tried.map.floor.known &= entry->tiles;
     nav_kept_enter(&k->tried, nav_particle_map_pose(&k->calm.map), entry->sigma_m, entry->sigma_rad);
     kidnap_catch_up(&k->tried, v, v->course->row);
     return nav_course_evidence(&k->tried.course, &k->tried.map);
@@ -133,22 +131,22 @@ static double kidnap_floor(const struct nav_kept *kept)
 }
 
 /* Rows that the map does not explain: the wheels may have slipped, or the floor is otherwise than mapped, or the robot
- * was carried off; not where the map, its tiles' textures forgotten, explains them better than a new one. */
+ * was carried off. */
 static enum nav_kidnap_verdict kidnap_decide(struct nav_kidnap *k, const struct nav_kidnap_view *v)
 {
-    const struct kidnap_entry slip = {SLIP_M, SLIP_RAD, TILES_AS_MAPPED}, bare = {BARE_M, BARE_RAD, NO_TILES},
-                              renamed = {BARE_M, BARE_RAD, TILES_RENAMED};
+    const struct kidnap_entry slip = {SLIP_M, SLIP_RAD, true}, bare = {BARE_M, BARE_RAD, false};
     long split = kidnap_split(k, v);
     double anew = nav_course_evidence(&k->tried.course, &k->tried.map), held = kidnap_gained(k, v, split);
     kidnap_catch_up(&k->calm, v, split);
     double without = kidnap_try(k, v, &bare) - FLOOR_SHARE * kidnap_floor(&k->calm);
     double slipped = kidnap_try(k, v, &slip), mended = fmax(without, slipped);
-    if (mended <= anew - RATHER && (!k->calm.map.floor.known || kidnap_try(k, v, &renamed) <= anew))
+    if (mended <= anew - RATHER)
         return NAV_KIDNAP_CARRIED;
     k->enough = k->ratio + MORE;
     if (mended < fmax(anew, held) + MENDED)
         return NAV_KIDNAP_NONE;
-    (void)kidnap_try(k, v, without > slipped ? &bare : &slip);
+    if (without > slipped)
+        (void)kidnap_try(k, v, &bare);
     return NAV_KIDNAP_MENDED;
 }
 
