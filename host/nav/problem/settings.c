@@ -1,5 +1,6 @@
 #include "settings.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -9,28 +10,33 @@ struct entry {
     double standard, low, high;
 };
 
-#define ENTRY(section, key, standard, low, high)                                                                       \
+/* Ranges that settings share: of shares (of a metre and a radian, too), and of what is on (true) or off. */
+#define SHARE 0.0, 1.0
+#define SWITCH false, true
+
+/* The last arguments are the range's ends. */
+#define ENTRY(section, key, standard, ...)                                                                             \
     {                                                                                                                  \
-#section "." #key, offsetof(struct nav_settings, section.key), standard, low, high                             \
+#section "." #key, offsetof(struct nav_settings, section.key), standard, __VA_ARGS__                           \
     }
 
 static const struct entry ENTRIES[] = {
-    ENTRY(texture, temper, 0.0, 0.0, 1.0),
-    ENTRY(texture, outlier, 0.2, 0.0, 1.0),
-    ENTRY(texture, spacing_m, 0.03, 0.0, 1.0),
-    ENTRY(texture, repeat, 1.0, 0.0, 1.0),
-    ENTRY(radial, miss, 0.1, 0.0, 1.0),
-    ENTRY(radial, ghost, 0.01, 0.0, 1.0),
+    ENTRY(texture, temper, 0.0, SHARE),
+    ENTRY(texture, outlier, 0.2, SHARE),
+    ENTRY(texture, spacing_m, 0.03, SHARE),
+    ENTRY(texture, repeat, true, SWITCH),
+    ENTRY(radial, miss, 0.1, SHARE),
+    ENTRY(radial, ghost, 0.01, SHARE),
     ENTRY(radial, edge_m, 0.006, 0.0001, 0.1),
-    ENTRY(radial, spacing_m, 0.02, 0.0, 1.0),
-    ENTRY(normal, outlier, 0.1, 0.0, 1.0),
-    ENTRY(trust, learn, 1.0, 0.0, 1.0),
-    ENTRY(map, learn, 1.0, 0.0, 1.0),
+    ENTRY(radial, spacing_m, 0.02, SHARE),
+    ENTRY(normal, outlier, 0.1, SHARE),
+    ENTRY(trust, learn, true, SWITCH),
+    ENTRY(map, learn, true, SWITCH),
     ENTRY(motion, along_m, 0.3, 0.0, 10.0),
     ENTRY(motion, turn_rad, 0.5, 0.0, 10.0),
-    ENTRY(motion, drift_rad, 0.03, 0.0, 1.0),
-    ENTRY(motion, calibrate, 1.0, 0.0, 1.0),
-    ENTRY(motion, gaps, 1.0, 0.0, 1.0),
+    ENTRY(motion, drift_rad, 0.03, SHARE),
+    ENTRY(motion, calibrate, true, SWITCH),
+    ENTRY(motion, gaps, true, SWITCH),
     ENTRY(grid, cell_m, 0.05, 0.005, 1.0),
     ENTRY(grid, cell_deg, 10.0, 0.5, 120.0),
     ENTRY(grid, sub, 2.0, 1.0, 16.0),
@@ -39,19 +45,19 @@ static const struct entry ENTRIES[] = {
     ENTRY(foveal, cells, 11.0, 3.0, 51.0),
     ENTRY(foveal, diameter_m, 0.25, 0.01, 5.0),
     ENTRY(foveal, span_deg, 90.0, 1.0, 360.0),
-    ENTRY(foveal, quantum_m, 0.01, 0.0, 1.0),
+    ENTRY(foveal, quantum_m, 0.01, SHARE),
     ENTRY(foveal, quantum_deg, 2.6, 0.0, 90.0),
-    ENTRY(foveal, printed, 0.0, 0.0, 1.0),
-    ENTRY(foveal, inflate, 0.0, 0.0, 1.0),
+    ENTRY(foveal, printed, false, SWITCH),
+    ENTRY(foveal, inflate, false, SWITCH),
     ENTRY(particle, count, 0.0, 0.0, 1e6),
     ENTRY(particle, least, 300.0, 2.0, 1e6),
     ENTRY(particle, most, 20000.0, 2.0, 1e6),
     ENTRY(particle, error, 0.05, 1e-4, 1.0),
     ENTRY(particle, bin_m, 0.05, 0.001, 10.0),
     ENTRY(particle, bin_deg, 10.0, 0.1, 360.0),
-    ENTRY(particle, resample, 0.5, 0.0, 1.0),
-    ENTRY(particle, recovery, 0.005, 0.0, 1.0),
-    ENTRY(particle, recovery_fast, 0.05, 0.0, 1.0),
+    ENTRY(particle, resample, 0.5, SHARE),
+    ENTRY(particle, recovery, 0.005, SHARE),
+    ENTRY(particle, recovery_fast, 0.05, SHARE),
     ENTRY(adaptive, budget, 90000.0, 40000.0, 1000000000.0),
     ENTRY(adaptive, detail_budget, 2000000.0, 40000.0, 1000000000.0),
     ENTRY(adaptive, most, 2000.0, 16.0, 100000.0),
@@ -65,7 +71,7 @@ static const struct entry ENTRIES[] = {
     ENTRY(adaptive, rows, 2.0, 0.1, 100.0),
     ENTRY(adaptive, hazard, 0.0001, 1e-12, 0.1),
     ENTRY(adaptive, wake, 0.001, 1e-12, 0.4),
-    ENTRY(adaptive, scattered, 0.01, 0.0, 1.0),
+    ENTRY(adaptive, scattered, 0.01, SHARE),
 };
 
 #define COUNT ((int)(sizeof ENTRIES / sizeof ENTRIES[0]))
