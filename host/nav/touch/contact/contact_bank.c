@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "contact_geometry.h"
+#include "pose.h"
 
 enum { CORNERS = 14, ROUNDS = 8, NORMALS = 5 };
 #define LEAST_ARC 0.2        /* cones: nearer, the mount is touched */
@@ -19,7 +20,7 @@ enum { CORNERS = 14, ROUNDS = 8, NORMALS = 5 };
 #define FLAT 0.02              /* rad, cones: what is not known of a contact that has gone over between tip and shaft */
 #define EDGE 1e-3
 #define LEAST_OVER 1e-2 /* probability from which on a part of a hypothesis goes over */
-#define QUARTER 1.57079632679489661923
+#define QUARTER (NAV_PI / 2.0)
 #define LEAST_LOG_WEIGHT -9.0
 #define TINY 1e-300
 #define LEAST_TOUCH 4.0 /* standard deviations of a block's tilt from which something is felt */

@@ -4,8 +4,9 @@
 #include <string.h>
 
 #include "nav_cubic.h"
+#include "pose.h"
 
-enum { STEPS = 32, POWERS = 3, FIELDS = 3 };
+enum { STEPS = 32 };
 enum { ACROSS, TURN, SHORT }; /* fields: y/slope, moment/slope, (arc - x)/slope^2 */
 
 #define LEAST_ARC 0.10
@@ -16,7 +17,6 @@ enum { ACROSS, TURN, SHORT }; /* fields: y/slope, moment/slope, (arc - x)/slope^
 #define LEAST_TIP 0.3
 #define LARGEST_TIP 0.85
 #define FIRST_SLOPE 1e-3 /* the fields at slope 0 are limits */
-#define HALF_TURN 3.14159265358979323846
 
 /* Seen from the contact: angle of the tangent, and place. */
 struct point {
@@ -81,7 +81,7 @@ static double beam_stiffness(double arc)
     return 1.0 / (-0.5 + left / 3 + 1.0 / (6 * left * left));
 }
 
-static void beam_fields(double arc, double slope, struct shape at, double field[FIELDS])
+static void beam_fields(double arc, double slope, struct shape at, double field[NAV_BEAM_FIELDS])
 {
     field[ACROSS] = at.y / slope;
     field[TURN] = at.moment / slope;
@@ -95,15 +95,15 @@ static double beam_slope(int j)
 
 static void beam_fill_arc(struct nav_contact_beam *beam, int i)
 {
-    double arc = LEAST_ARC + (beam->tip - LEAST_ARC) * i / (NAV_BEAM_ARCS - 1), force[POWERS];
-    for (int n = 0; n < POWERS; n++)
+    double arc = LEAST_ARC + (beam->tip - LEAST_ARC) * i / (NAV_BEAM_ARCS - 1), force[NAV_BEAM_POWERS];
+    for (int n = 0; n < NAV_BEAM_POWERS; n++)
         force[n] = FIRST_SLOPE * beam_stiffness(arc);
     for (int j = 0; j < NAV_BEAM_SLOPES; j++) {
-        double slope = beam_slope(j), field[POWERS][FIELDS];
-        for (int n = 0; n < POWERS; n++)
+        double slope = beam_slope(j), field[NAV_BEAM_POWERS][NAV_BEAM_FIELDS];
+        for (int n = 0; n < NAV_BEAM_POWERS; n++)
             beam_fields(arc, slope, beam_at_slope(arc, slope, (n - 1) * TABLE_NU, &force[n]), field[n]);
-        for (int f = 0; f < FIELDS; f++) {
-            float *out = beam->shaft[i][j] + f * POWERS;
+        for (int f = 0; f < NAV_BEAM_FIELDS; f++) {
+            float *out = beam->shaft[i][j] + f * NAV_BEAM_POWERS;
             out[0] = (float)field[1][f];
             out[1] = (float)((field[2][f] - field[0][f]) / (2 * TABLE_NU));
             out[2] = (float)((0.5 * (field[2][f] + field[0][f]) - field[1][f]) / (TABLE_NU * TABLE_NU));
@@ -122,10 +122,10 @@ static void beam_fill_direction(struct nav_contact_beam *beam, int i)
     double direction = LEAST_DIRECTION + (NAV_BEAM_DIRECTION - LEAST_DIRECTION) * i / (NAV_BEAM_DIRECTIONS - 1);
     double force = FIRST_SLOPE * beam_stiffness(beam->tip);
     for (int j = 0; j < NAV_BEAM_SLOPES; j++) {
-        double share = j > 0 ? (double)j / (NAV_BEAM_SLOPES - 1) : FIRST_SLOPE, field[FIELDS];
-        double slope = share * beam_most(direction), nu = tan(slope + 0.5 * HALF_TURN - direction);
+        double share = j > 0 ? (double)j / (NAV_BEAM_SLOPES - 1) : FIRST_SLOPE, field[NAV_BEAM_FIELDS];
+        double slope = share * beam_most(direction), nu = tan(slope + 0.5 * NAV_PI - direction);
         beam_fields(beam->tip, slope, beam_at_slope(beam->tip, slope, nu, &force), field);
-        for (int f = 0; f < FIELDS; f++)
+        for (int f = 0; f < NAV_BEAM_FIELDS; f++)
             beam->end[i][j][f] = (float)field[f];
     }
 }
@@ -158,7 +158,8 @@ bool nav_contact_beam_make(struct nav_contact_beam *beam, double tip)
         }
 
 /* Makes place and moment of the fields f and their derivatives. arc: contact's; arc_1: its derivative. */
-static void beam_bend(double arc, double arc_1, double slope, double f[4][FIELDS], struct nav_contact_bend *bend)
+static void beam_bend(double arc, double arc_1, double slope, double f[4][NAV_BEAM_FIELDS],
+                      struct nav_contact_bend *bend)
 {
     bend->x = arc - slope * slope * f[0][SHORT];
     bend->y = slope * f[0][ACROSS];
@@ -191,14 +192,14 @@ bool nav_contact_beam_shaft(const struct nav_contact_beam *beam, double arc, dou
     struct nav_cubic cj = nav_cubic_at(fmax(slope, 0.0) * per_slope, NAV_BEAM_SLOPES);
     float sum[3][NAV_BEAM_VALUES + 3] = {{0}};
     BEAM_SUMS(beam->shaft, NAV_BEAM_VALUES + 3, ci, cj, sum)
-    double f[4][FIELDS];
-    for (int n = 0; n < FIELDS; n++) {
+    double f[4][NAV_BEAM_FIELDS];
+    for (int n = 0; n < NAV_BEAM_FIELDS; n++) {
         const double scale[3] = {1.0, per_arc, slope > 0.0 ? per_slope : 0.0};
         for (int k = 0; k < 3; k++) {
-            const float *c = sum[k] + n * POWERS;
+            const float *c = sum[k] + n * NAV_BEAM_POWERS;
             f[k][n] = scale[k] * (c[0] + nu * (c[1] + nu * c[2]));
         }
-        f[3][n] = sum[0][n * POWERS + 1] + 2.0 * nu * sum[0][n * POWERS + 2];
+        f[3][n] = sum[0][n * NAV_BEAM_POWERS + 1] + 2.0 * nu * sum[0][n * NAV_BEAM_POWERS + 2];
     }
     beam_bend(arc, 1.0, slope, f, bend);
     return inside;
@@ -216,8 +217,8 @@ bool nav_contact_beam_end(const struct nav_contact_beam *beam, double direction,
     struct nav_cubic cj = nav_cubic_at(slope * per_slope, NAV_BEAM_SLOPES);
     float sum[3][4] = {{0}};
     BEAM_SUMS(beam->end, 4, ci, cj, sum)
-    double f[4][FIELDS] = {{0}};
-    for (int n = 0; n < FIELDS; n++) {
+    double f[4][NAV_BEAM_FIELDS] = {{0}};
+    for (int n = 0; n < NAV_BEAM_FIELDS; n++) {
         f[0][n] = sum[0][n];
         f[2][n] = per_slope * sum[2][n];
         f[1][n] = per_direction * sum[1][n] - f[2][n] * slope / most * most_by;

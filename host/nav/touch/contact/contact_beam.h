@@ -18,7 +18,14 @@ extern "C" {
 #define NAV_BEAM_DIRECTION 2.85 /* rad: largest direction of a force on the tip in the table */
 
 /* cffi: begin */
-enum { NAV_BEAM_ARCS = 24, NAV_BEAM_SLOPES = 16, NAV_BEAM_DIRECTIONS = 20, NAV_BEAM_VALUES = 9 };
+enum {
+    NAV_BEAM_ARCS = 24,
+    NAV_BEAM_SLOPES = 16,
+    NAV_BEAM_DIRECTIONS = 20,
+    NAV_BEAM_FIELDS = 3,
+    NAV_BEAM_POWERS = 3,
+    NAV_BEAM_VALUES = NAV_BEAM_FIELDS * NAV_BEAM_POWERS
+};
 
 struct nav_contact_beam {
     double tip; /* arc length of the tip, cones */

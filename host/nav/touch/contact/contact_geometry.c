@@ -3,10 +3,12 @@
 #include <math.h>
 #include <string.h>
 
+#include "pose.h"
+
 enum { NEWTONS = 6 };
 #define CLOSE 1e-6      /* cones, rad: what Newton's method may leave; the tables have 24 bits */
 #define LEAST_TURN 1e-9 /* of a determinant */
-#define QUARTER 1.57079632679489661923
+#define QUARTER (NAV_PI / 2.0)
 #define STILL 2e-6      /* cones: a slide below is none */
 #define LARGEST_GAP 0.5 /* rad, as a slope: farther away nothing is known of the object */
 

@@ -3,7 +3,8 @@
 #include <math.h>
 #include <stdbool.h>
 
-#define TWO_PI 6.283185307179586
+#include "pose.h"
+
 #define NODES 25        /* of the trapezoid rule, over ... */
 #define NODES_REACH 4.0 /* ... so many standard deviations to either side */
 
@@ -81,8 +82,8 @@ static double radial_whisk_strangeness(const struct nav_whisk_model *m, const st
     }
     if (length > 0.0) {
         double off = acos(fmax(-1.0, fmin(1.0, along))) / m->direction_sd;
-        double usual = exp(-0.5 * off * off) / (m->direction_sd * sqrt(TWO_PI)) + STRANGE_TURN * 2.0 / TWO_PI;
-        odds *= 2.0 / TWO_PI / usual;
+        double usual = exp(-0.5 * off * off) / (m->direction_sd * sqrt(2.0 * NAV_PI)) + STRANGE_TURN / NAV_PI;
+        odds *= 1.0 / NAV_PI / usual;
     }
     if (shape->quality == NAV_SHAPE_WHOLE) {
         double off = fmax(0.0, (log(shape->misfit + 1e-9) - m->log_misfit) / m->log_misfit_sd);
@@ -127,7 +128,7 @@ static struct moments radial_whisk_weigh(const struct nav_whisk_model *m, double
     sum.mean = nearest + sum.mean / sum.mass;
     sum.square = sum.square / sum.mass + nearest * (2.0 * sum.mean - nearest);
     sum.tip /= sum.mass;
-    sum.mass *= step / (m->high_mm - m->low_mm) * exp(-scale * least * least) / sqrt(TWO_PI * variance);
+    sum.mass *= step / (m->high_mm - m->low_mm) * exp(-scale * least * least) / sqrt(2.0 * NAV_PI * variance);
     return sum;
 }
 
