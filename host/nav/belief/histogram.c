@@ -695,11 +695,13 @@ static void histogram_pass_mass(const struct nav_histogram *h, int g, float *mas
 /* Adds a group to the line's sums and to the store. */
 static void histogram_pass_take(struct nav_histogram *h, int g, const float *mass)
 {
-    static const nav_lanes STEPS = {0.5f, 1.5f, 2.5f, 3.5f, 4.5f, 5.5f, 6.5f, 7.5f};
     struct nav_pass *p = h->pass;
     struct nav_line_sums *sums = &p->sums;
     float x = (float)(g * NAV_LANES * h->shape.cell + h->next.shift_x[p->at.slice] - p->about.x);
-    nav_lanes held = *(const nav_lanes *)mass, at = (float)h->shape.cell * STEPS + x;
+    nav_lanes held = *(const nav_lanes *)mass, middle;
+    for (int k = 0; k < NAV_LANES; k++)
+        middle[k] = (float)k + 0.5f;
+    nav_lanes at = (float)h->shape.cell * middle + x;
     sums->mass[0] += held;
     sums->mass[1] += held * at;
     sums->mass[2] += held * at * at;

@@ -22,12 +22,12 @@ struct particle_sums {
 
 static struct particle_sums moments_sum(const struct nav_particles *p, struct nav_pose about, bool all)
 {
-    static const float NEAR_COSINE = 0.8775825619f; /* cos(NAV_NEAR_RAD) */
+    const float near_cosine = (float)cos(NAV_NEAR_RAD);
     float c0 = (float)cos(about.theta), s0 = (float)sin(about.theta), x0 = (float)about.x, y0 = (float)about.y;
     struct particle_sums sum = {.mass = 0.0};
     for (long i = 0; i < p->count; i++) {
         float x = p->x[i] - x0, y = p->y[i] - y0;
-        if (!all && (x * x + y * y > (float)(NAV_NEAR_M * NAV_NEAR_M) || c0 * p->c[i] + s0 * p->s[i] < NEAR_COSINE))
+        if (!all && (x * x + y * y > (float)(NAV_NEAR_M * NAV_NEAR_M) || c0 * p->c[i] + s0 * p->s[i] < near_cosine))
             continue;
         float t = moments_angle(c0, s0, p->c[i], p->s[i]), w = p->weight[i];
         const float first[3] = {w * x, w * y, w * t};
@@ -53,10 +53,12 @@ double nav_particles_near(const struct nav_particles *p, struct nav_pose pose, s
 
 void nav_particles_covariance(const struct nav_particles *p, struct nav_pose about, double covariance[9])
 {
-    static const int PLACE[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
     struct particle_sums sum = moments_sum(p, about, true);
-    for (int k = 0; k < 9; k++)
-        covariance[k] = sum.second[PLACE[k]];
+    const double *second = sum.second;
+    for (int i = 0; i < 3; i++) {
+        for (int k = i; k < 3; k++)
+            covariance[3 * i + k] = covariance[3 * k + i] = *second++;
+    }
 }
 
 int nav_particles_modes(struct nav_particles *p, struct nav_mode mode[NAV_MODES_MOST])

@@ -7,10 +7,10 @@
 #include "pose.h"
 
 enum { COVERAGE_HEADINGS = 8, COVERAGE_NEW = -1, COVERAGE_SETTLED = -2, COVERAGE_NOWHERE = -1 };
+#define COVERAGE_HEADING_RAD (2.0 * NAV_PI / COVERAGE_HEADINGS)
 
 static const double COVERAGE_STRAIGHT_RAD = 0.05; /* a smaller turn is made on the way */
 static const double COVERAGE_PASSED_LEAST = 1e-4; /* ways that are less likely to be free are not followed */
-static const int COVERAGE_DX[] = {1, 1, 0, -1, -1, -1, 0, 1}, COVERAGE_DY[] = {0, 1, 1, 1, 0, -1, -1, -1};
 
 struct coverage_state {
     float seconds, swept, passed;
@@ -21,6 +21,7 @@ struct coverage_state {
 struct nav_coverage {
     struct nav_coverage_options options;
     double aside[NAV_COVERAGE_ASIDES_MOST];
+    int dx[COVERAGE_HEADINGS], dy[COVERAGE_HEADINGS]; /* a step, in cells */
     int cells;
     struct coverage_state *state; /* [cells * HEADINGS] */
     int *heap;                    /* [cells * HEADINGS] states, the fastest first */
@@ -37,6 +38,10 @@ struct nav_coverage *nav_coverage_new(int cells, const struct nav_coverage_optio
     struct nav_coverage *c = calloc(1, sizeof *c);
     if (!c)
         return NULL;
+    for (int heading = 0; heading < COVERAGE_HEADINGS; heading++) {
+        c->dx[heading] = (int)lround(cos(heading * COVERAGE_HEADING_RAD));
+        c->dy[heading] = (int)lround(sin(heading * COVERAGE_HEADING_RAD));
+    }
     c->options = *options;
     c->cells = cells;
     for (int k = 0; k < options->asides; k++)
@@ -118,7 +123,7 @@ static double coverage_beside(const struct nav_coverage *c, int column, int row,
 {
     const struct nav_coverage_ground *g = &c->ground;
     bool diagonal = heading % 2;
-    int fresh = 0, left_x = -COVERAGE_DY[heading], left_y = COVERAGE_DX[heading];
+    int fresh = 0, left_x = -c->dy[heading], left_y = c->dx[heading];
     for (int k = 0; k < c->options.asides; k++) {
         int offset = c->offset[diagonal][k], x = column + offset * left_x, y = row + offset * left_y;
         if (x >= 0 && x < g->columns && y >= 0 && y < g->rows)
@@ -132,7 +137,7 @@ static void coverage_forward(struct nav_coverage *c, int state)
     const struct nav_coverage_ground *g = &c->ground;
     const struct coverage_state *s = &c->state[state];
     int heading = state % COVERAGE_HEADINGS, cell = state / COVERAGE_HEADINGS;
-    int column = cell % g->columns + COVERAGE_DX[heading], row = cell / g->columns + COVERAGE_DY[heading];
+    int column = cell % g->columns + c->dx[heading], row = cell / g->columns + c->dy[heading];
     if (column < 0 || column >= g->columns || row < 0 || row >= g->rows)
         return;
     int next = row * g->columns + column;
@@ -161,7 +166,7 @@ static void coverage_turn(struct nav_coverage *c, int state, int by)
 {
     struct coverage_state next = c->state[state];
     int cell = state / COVERAGE_HEADINGS, heading = (state + by + COVERAGE_HEADINGS) % COVERAGE_HEADINGS;
-    double seconds = NAV_PI / 4.0 / c->options.turn_rad_s;
+    double seconds = COVERAGE_HEADING_RAD / c->options.turn_rad_s;
     next.seconds += (float)(seconds + (coverage_turned(c, state) ? 0.0 : c->options.begin_s));
     next.from = state;
     coverage_reach(c, cell * COVERAGE_HEADINGS + heading, next);
@@ -175,7 +180,7 @@ static bool coverage_begin(struct nav_coverage *c, double x, double y, double tu
     if (!(column >= 0.0 && column < g->columns && row >= 0.0 && row < g->rows && isfinite(turn)))
         return false;
     for (int heading = 0; heading < COVERAGE_HEADINGS; heading++) {
-        double angle = fabs(remainder(heading * (NAV_PI / 4.0) - turn, 2.0 * NAV_PI));
+        double angle = fabs(remainder(heading * COVERAGE_HEADING_RAD - turn, 2.0 * NAV_PI));
         double begin = angle > COVERAGE_STRAIGHT_RAD ? c->options.begin_s : 0.0;
         int state = ((int)row * g->columns + (int)column) * COVERAGE_HEADINGS + heading;
         coverage_reach(c, state,
