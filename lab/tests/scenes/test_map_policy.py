@@ -34,7 +34,7 @@ class MapLoop:
         self.arena = self.recipe.arena(rng["arena"], self.robot.body_radius_m)
         self.begin = walk.draw_pose(self.arena, self.robot.body_radius_m, rng["start"])
         normals = self.recipe.world.normal_sd_rad is not None
-        self._mapper, self._pose = Mapper(self.robot, self.arena.textures, seed, normals=normals), np.zeros(3)
+        self._mapper, self._pose = Mapper(self.robot, self.arena.textures, normals=normals), np.zeros(3)
         self._mover = Explorer(self.arena, self.robot, self.begin, rng["path"], FULL)
         self._mover.behaviour.choices = policy(self, self._mover.behaviour.choices)
 
