@@ -3,7 +3,6 @@
 #include <math.h>
 
 static const double FACING_LEAST = 0.15; /* cosine between whisker and normal */
-static const double GATE = 12.0;         /* squared standard deviations */
 static const double FAR_M = 0.5;
 static const double REACH_RIGHT = 0.4,
                     REACH_FREE = 0.08; /* m in which a face is found to go on, at right angles and not */
@@ -55,7 +54,7 @@ double nav_face_decay(const struct nav_face *g)
 double nav_face_likelihood(const struct nav_face *g, const struct nav_face_view *v, double noise)
 {
     double total = v->variance + noise;
-    if (v->off * v->off > GATE * total)
+    if (v->off * v->off > NAV_FACE_GATE * total)
         return 0.0;
     double reach = exp(-nav_face_beyond(g, v->along) * nav_face_decay(g));
     return v->facing * reach * nav_face_normal_density(v->off, total);

@@ -58,6 +58,7 @@ bool nav_face_join(struct nav_face *, const struct nav_face *younger, struct nav
 
 double nav_face_normal_density(double off, double variance);
 
+#define NAV_FACE_GATE 12.0       /* squared standard deviations from it of what is of it */
 #define NAV_FACE_RIGHT_RAD 0.006 /* standard deviation of right angles */
 #define NAV_FACE_ROUGH_M 0.001   /* of any face */
 #define NAV_FACE_NEW_PER_M 0.03  /* density of faces not in the map, where one that is has 1 */

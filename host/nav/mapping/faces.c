@@ -6,7 +6,6 @@ static const double NEW_SHARE = 0.1;                   /* of contacts that meet 
 static const double SHARP_M = 0.02;                    /* a contact is surely of a face known so well ... */
 static const double CLEAR = 5.0;                       /* ... that explains it so much better than a new one */
 static const double NORMAL_GATE = 9.0;                 /* squared standard deviations */
-static const double EDGE_M = 0.006;                    /* over which noticing a contact falls off */
 static const double PASSED = 0.95;                     /* probability that a whisker went through a face */
 static const double GONE = 3.0, GONE_SHARE = 0.5;      /* passages that remove a face, beside so many of its contacts */
 static const double HITS_MOST = 20.0;                  /* contacts that count against passages */
@@ -94,7 +93,8 @@ static double faces_margin(const struct nav_joint *j)
     return CORNER_M + 2.0 * sqrt(j->cov[NAV_JOINT_X] + j->cov[NAV_JOINT_Y * (j->room + 1)]);
 }
 
-double nav_faces_miss(struct nav_faces *f, struct nav_joint *j, const struct nav_touch *end, double length, double miss)
+double nav_faces_miss(struct nav_faces *f, struct nav_joint *j, const struct nav_touch *end, double length, double edge,
+                      double miss)
 {
     struct nav_face_view v;
     double sum = 0.0, margin = faces_margin(j);
@@ -102,7 +102,7 @@ double nav_faces_miss(struct nav_faces *f, struct nav_joint *j, const struct nav
         struct nav_face *g = &f->face[n];
         if (!nav_face_look(g, j, end, &v) || v.off < -length * v.facing)
             continue;
-        double z = v.off / sqrt(v.variance + EDGE_M * EDGE_M), where = v.along + fmin(v.off, 0.0) / v.facing * v.slant;
+        double z = v.off / sqrt(v.variance + edge * edge), where = v.along + fmin(v.off, 0.0) / v.facing * v.slant;
         if (z > 3.0 || !nav_face_felt(g, where, margin))
             continue;
         double beyond = 0.5 * erfc(z / sqrt(2.0));

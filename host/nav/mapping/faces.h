@@ -31,8 +31,9 @@ void nav_faces_begin(struct nav_faces *);
 double nav_faces_take(struct nav_faces *, struct nav_joint *, const struct nav_touches *, const struct nav_contact *);
 
 /* Takes that a whisker touches nothing: no face stands before its end, but a share of `miss` goes unnoticed. end: its
- * end, whose direction is the whisker's. Returns the log-likelihood. */
-double nav_faces_miss(struct nav_faces *, struct nav_joint *, const struct nav_touch *end, double length, double miss);
+ * end, whose direction is the whisker's. edge: m over which noticing falls off there. Returns the log-likelihood. */
+double nav_faces_miss(struct nav_faces *, struct nav_joint *, const struct nav_touch *end, double length, double edge,
+                      double miss);
 
 /* Takes that the robot's body stands where it stands: no face goes through it. Returns the log-likelihood. */
 double nav_faces_stand(struct nav_faces *, struct nav_joint *, double radius);

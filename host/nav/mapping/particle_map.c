@@ -65,7 +65,8 @@ static void particle_map_contact(struct nav_particle_map *p, const struct nav_re
                               .normal_var = (double)c->normal_sd * (double)c->normal_sd};
     if (isinf(c->distance)) {
         if (c->weight >= NEW_LEAST)
-            p->evidence += nav_faces_miss(&p->faces, &p->joint, &touch, length, MISS);
+            p->evidence +=
+                nav_faces_miss(&p->faces, &p->joint, &touch, length, r->problem->settings.radial.edge_m, MISS);
         return;
     }
     struct nav_contact contact = {nav_touches_keep(&p->touches, touch), sigma / sqrt(weight), length, ghost};

@@ -2,7 +2,6 @@
 
 #include <math.h>
 
-static const double GATE = 12.0;        /* squared standard deviations */
 static const double FACING = 0.7;       /* cosine between the normals of a face and a segment of it */
 static const double SEGMENT_HITS = 4.0; /* contacts that a segment counts for, at most */
 
@@ -43,7 +42,7 @@ static void segment_match_face(const struct nav_face *g, const struct nav_joint 
     double off = v.off - cross / angle_var * m->turn;
     double left = v.variance + line->offset_var + NAV_FACE_ROUGH_M * NAV_FACE_ROUGH_M - cross * cross / angle_var;
     double beyond = fmax(nav_face_beyond(g, v.along) - line->span / 2.0, 0.0);
-    if (m->turn * m->turn / angle_var + off * off / left < GATE)
+    if (m->turn * m->turn / angle_var + off * off / left < NAV_FACE_GATE)
         m->likelihood = nav_face_normal_density(m->turn, angle_var) * nav_face_normal_density(off, left) *
                         exp(-beyond * nav_face_decay(g));
 }

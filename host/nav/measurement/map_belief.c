@@ -6,8 +6,8 @@
 
 #include "trust.h"
 
-/* Prior odds that a place differs from the map, nats: what it costs to believe so. */
-static const double TILE = 6.0, BOX = 3.0, THING = 6.0;
+/* As NAV_MAP_TILE, of a box and of a thing that is not mapped. */
+static const double BOX = 3.0, THING = 6.0;
 /* One found as mapped is surer of it by as much again at most, one found otherwise by this. */
 static const double KEPT_MOST = 4.0;
 /* Contacts within this distance are with one thing; one within three of a known thing is likely part of it. */
@@ -186,8 +186,8 @@ static bool map_learn_tile(struct nav_likelihood *l, int w, int which)
         tile->other = (uint8_t)best;
     bool wrong = m->floor[which] != reported;
     double nats = map_evidence(l, w, map_ratio(l, w, wrong ? reported : tile->other));
-    tile->nats = map_kept((double)tile->nats + (wrong ? -nats : nats), TILE);
-    m->floor[which] = map_wrong((double)tile->nats, TILE, wrong) ? tile->other : (uint8_t)reported;
+    tile->nats = map_kept((double)tile->nats + (wrong ? -nats : nats), NAV_MAP_TILE);
+    m->floor[which] = map_wrong((double)tile->nats, NAV_MAP_TILE, wrong) ? tile->other : (uint8_t)reported;
     return !wrong && m->floor[which] != reported;
 }
 

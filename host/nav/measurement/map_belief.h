@@ -9,6 +9,8 @@
 
 #include "sensing.h"
 
+#define NAV_MAP_TILE 6.0 /* nats: what it costs to believe that a tile differs from the map */
+
 /* 0, or -1 without memory; nav_map_free either way. */
 int nav_map_init(struct nav_map_belief *, const struct nav_arena *reported, size_t sensors);
 void nav_map_free(struct nav_map_belief *);

@@ -2,11 +2,12 @@
 
 #include <math.h>
 
+#include "map_belief.h"
+
 /* Nats by which a new map explains rows better than the one in use: NOTICED, a kidnap is decided on; MORE, after a
  * decision that it was none. A kidnap once in ten thousand rows costs 9; the rest is how much the ratio varies where
  * the map in use is a little off. */
 static const double NOTICED = 25.0, MORE = 10.0;
-static const double TILE = 6.0; /* nats that a tile costs which is otherwise than mapped, as in map_belief */
 static const double BARE_M = 0.05, BARE_RAD = 0.05; /* how well the place is known where tiles are otherwise */
 static const double FLOOR_SHARE = 0.1; /* of the evidence for tiles: windows are more certain than they should be */
 /* Wheels that slipped by SLIP_M and SLIP_RAD, or a floor other than mapped, are preferred to a kidnap within RATHER
@@ -189,7 +190,7 @@ enum nav_kidnap_verdict nav_kidnap_take(struct nav_kidnap *k, const struct nav_k
         kidnap_doubt(k, v, row, gained->patches - gained->windows);
     k->ratio = k->felt;
     for (int n = 0; n < k->doubts; n++)
-        k->ratio += fmin(k->doubt[n].nats, TILE);
+        k->ratio += fmin(k->doubt[n].nats, NAV_MAP_TILE);
     if (k->ratio <= 0.0 || !kidnap_held(k, v)) {
         kidnap_calm(k, v);
         if (v->course->row - k->calm.course.row >= CALM_ROWS)
