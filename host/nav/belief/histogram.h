@@ -15,11 +15,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "expected.h"
 #include "gaussian.h"
 #include "rng.h"
 
 /* Cells of a group; and the sums of a slice: its mass and that times x, y, xx, xy, yy, relative to some place. */
-enum { NAV_LANES = 8, NAV_MOMENTS = 6 };
+enum { NAV_LANES = NAV_CELLS_AHEAD, NAV_MOMENTS = 6 };
 
 #define NAV_LEVER_M 0.2 /* from the robot's middle to what a whisker meets, about: a turn moves that so far */
 

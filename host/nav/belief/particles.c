@@ -9,7 +9,10 @@
 /* Poses that show which places of the map a row is about. */
 enum { MAP_POSES = 8 };
 
-enum { TRIES = 64, PLAIN = 5, WITH_ODOMETRY = 9 };
+enum { TRIES = 64 };
+
+/* Columns of all particles, and more of those that estimate the odometry's errors. */
+enum { X, Y, C, S, WEIGHT, PLAIN, GAIN = PLAIN, TURN_GAIN, NOISE, MODE, WITH_ODOMETRY };
 
 /* Log-likelihood of a particle where the robot cannot stand: below that of any row, and finite, so that particles all
  * of which are blocked keep their weights. */
@@ -20,8 +23,15 @@ static const double MUTATION = 0.03, NUDGE = 0.2;
 
 static void particles_point(struct nav_particles *p)
 {
-    float **column[WITH_ODOMETRY] = {&p->x,    &p->y,         &p->c,     &p->s,   &p->weight,
-                                     &p->gain, &p->turn_gain, &p->noise, &p->mode};
+    float **column[WITH_ODOMETRY] = {[X] = &p->x,
+                                     [Y] = &p->y,
+                                     [C] = &p->c,
+                                     [S] = &p->s,
+                                     [WEIGHT] = &p->weight,
+                                     [GAIN] = &p->gain,
+                                     [TURN_GAIN] = &p->turn_gain,
+                                     [NOISE] = &p->noise,
+                                     [MODE] = &p->mode};
     for (int k = 0; k < p->columns; k++)
         *column[k] = p->memory + (size_t)k * (size_t)p->room;
 }

@@ -12,7 +12,7 @@ static const double POSES_MOST = 268435456.0;
 enum { MARGIN = NAV_CELLS_AHEAD + 2 };
 
 /* Rows of poses in a cell: as the settings' ranges allow. */
-enum { ROWS_MOST = 16 * 16 };
+enum { ROWS_MOST = NAV_SUB_MOST * NAV_SUB_MOST };
 
 static size_t expected_pitch(const struct nav_expected *e)
 {

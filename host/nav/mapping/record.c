@@ -3,7 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { ROWS_MOST = 20000, CELLS_MOST = 16000000, HEAD = 5, PER_RAY = 4 };
+enum { ROWS_MOST = 20000, CELLS_MOST = 16000000 };
+enum { HEAD = (sizeof(struct nav_pose) + sizeof(struct nav_noise)) / sizeof(double) }; /* numbers of a motion */
+enum { PER_RAY = sizeof(struct nav_record_contact) / sizeof(float) };                  /* and of a contact */
 
 /* Errors of the odometry keep their value over a whole turn on the spot, rad. */
 static const double TURN_RAD = 2.0;

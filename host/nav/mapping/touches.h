@@ -2,12 +2,13 @@
 #ifndef NAV_TOUCHES_H
 #define NAV_TOUCHES_H
 
+#include <limits.h>
 #include <stdbool.h>
 #include <stdint.h>
 
 #include "motion.h"
 
-enum { NAV_TOUCHES_MOST = 64 };
+enum { NAV_TOUCHES_MOST = CHAR_BIT * sizeof(uint64_t) }; /* a bit each */
 
 /* A contact: its point and the whisker's direction in the robot's frame now. */
 struct nav_touch {

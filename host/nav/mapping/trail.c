@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Changes of texture under a tip, 1 / m. */
-static const double RATE[NAV_TRAIL_RATES] = {0.02, 0.1, 0.5, 2.5};
+/* Changes of texture under a tip, 1 / m: the least, and each by the one before. */
+static const double RATE_LEAST = 0.02, RATE_BY = 5.0;
 
 int nav_trail_init(struct nav_trail *t, const struct nav_arena *arena, const struct nav_robot *robot)
 {
@@ -87,8 +87,8 @@ void nav_trail_move(struct nav_trail *t, struct nav_pose step)
 /* Takes the window into the belief of patches; returns its log-likelihood. */
 static double trail_patch(struct nav_trail *t, int rate, int tip, double moved, const float *ratio)
 {
-    double *patch = t->patch + (ptrdiff_t)(rate * t->tips + tip) * t->classes, keep = exp(-RATE[rate] * moved),
-           total = 0.0;
+    double *patch = t->patch + (ptrdiff_t)(rate * t->tips + tip) * t->classes, total = 0.0;
+    double keep = exp(-RATE_LEAST * pow(RATE_BY, rate) * moved);
     for (int k = 0; k < t->classes; k++) {
         patch[k] = (keep * patch[k] + (1.0 - keep) / t->classes) * (double)ratio[k];
         total += patch[k];

@@ -7,6 +7,8 @@ extern "C" {
 #endif
 #pragma GCC visibility push(default)
 
+enum { NAV_SUB_MOST = 16 }; /* sub-poses of a cell per axis */
+
 /* cffi: begin */
 struct nav_texture_settings {
     double temper;    /* exponent on a window's likelihood; 0: estimated from the windows (texture_model.c) */
