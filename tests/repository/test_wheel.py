@@ -133,7 +133,7 @@ def test_filters_ring_and_perception_need_numpy_and_cffi_alone(core):
     environment = bare_environment()
     assert "adaptive" in run(core / "bin/whisker", "localise", "--list-filters", env=environment, cwd=core).stdout
     assert run(core / "bin/whisker", "--version", env=environment, cwd=core).stdout == f"whisker {__version__}\n"
-    modules = ("nav.filters", "nav.own", "nav.weigher", "bridge.ring", "touch.contact_filter", "touch.radial.model")
+    modules = ("nav.filters", "nav.own", "bridge.ring", "touch.contact_filter", "touch.radial.model")
     modules += ("touch.texture.model", "touch.texture.train", "scene", "observation", "pilot.pilot")
     run(core / "bin/python", "-c", "\n".join(f"import crunchbot.{one}" for one in modules), env=environment, cwd=core)
 

@@ -51,14 +51,19 @@ static int64_t daemon_stream_clock_ns(clockid_t clock)
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
+/* The first mapping is reported at once, so that a reader of the first frames can date them. */
 static void daemon_stream_map_clock(struct daemon_stream *stream, const struct whisker_frame *newest)
 {
+    const bool first = !stream->clock.begun;
     const uint16_t usb_time = (uint16_t)(newest->flags >> WHISKER_FRAME_USB_TIME_SHIFT);
     const int error =
         whisker_clock_add(&stream->clock, newest->time_cycles, usb_time, daemon_stream_clock_ns(CLOCK_MONOTONIC),
                           daemon_stream_clock_ns(CLOCK_REALTIME));
     if (error) {
         daemon_log_error(LOG_WARN, "clock", error);
+    }
+    if (first) {
+        daemon_stream_report(stream);
     }
 }
 
