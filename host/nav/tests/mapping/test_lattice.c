@@ -1,6 +1,7 @@
 /* The lattice of tiles, sought in the trail of one texture tip that wanders over a floor whose tiles are known here. */
 #include "near.h"
 
+#include "floor.h"
 #include "lattice.h"
 #include "rooms.h"
 
@@ -124,9 +125,36 @@ static void test_patches_of_any_shape_are_no_lattice(void **state)
     }
 }
 
+/* A tip above the middle of a tile, from the robot's centre, in a lattice that is turned against the world. */
+static void test_a_tip_is_in_the_tile_below_it(void **state)
+{
+    (void)state;
+    const struct nav_lattice l = {.turn = 0.3, .pitch = 0.4, .u = 0.1, .v = -0.05, .x = 0.2, .y = 0.3};
+    double mean[NAV_JOINT_FACES], cov[NAV_JOINT_FACES * NAV_JOINT_FACES];
+    struct nav_joint joint = {.room = NAV_JOINT_FACES, .mean = mean, .cov = cov};
+    struct nav_floor floor;
+    assert_int_equal(nav_floor_init(&floor, CLASSES), 0);
+    nav_joint_begin(&joint, 0.01, 0.01);
+    nav_joint_set(&joint, NAV_JOINT_X, 1.0, 0.0);
+    nav_joint_set(&joint, NAV_JOINT_Y, -0.4, 0.0);
+    nav_joint_set(&joint, NAV_JOINT_HEADING, 0.7, 0.0);
+    nav_floor_adopt(&floor, &joint, &l, false);
+    for (int n = 0; n < 25; n++) {
+        int column, row;
+        double along = l.u + (n % 5 - 1.5) * l.pitch, across = l.v + (n / 5 - 1.5) * l.pitch; /* tiles -2 to 2 */
+        double x = l.x + along * cos(l.turn) - across * sin(l.turn) - 1.0;
+        double y = l.y + along * sin(l.turn) + across * cos(l.turn) + 0.4;
+        nav_floor_at(&floor, &joint, cos(0.7) * x + sin(0.7) * y, cos(0.7) * y - sin(0.7) * x, &column, &row);
+        assert_int_equal(column, n % 5 - 2);
+        assert_int_equal(row, n / 5 - 2);
+    }
+    nav_floor_free(&floor);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_a_tip_is_in_the_tile_below_it),
         cmocka_unit_test(test_pitch_turn_and_phase_of_the_tiles_are_found),
         cmocka_unit_test(test_patches_of_any_shape_are_no_lattice),
     };
