@@ -80,31 +80,56 @@ bool MixedRig::transfer(const std::function<bool()> &usb_step)
     quiet_++;
     if (rtl_ticks_ > 0) {
         rtl_ticks_--;
-    } else if (!at_bytes_) {
-        try_bytes(usb_step);
-    } else if (frame_bytes_waiting() > BYTES_WAITING_MOST) {
+    } else if (!at_bytes_ && !try_bytes(usb_step)) {
+        return finish_tick(usb_step);
+    } else if (at_bytes_ && frame_bytes_waiting() > BYTES_WAITING_MOST) {
         disturbed();
     }
     return at_bytes_ ? byte_tick(usb_step) : RtlRig::transfer(usb_step);
 }
 
-// Only with no frame under way: neither in the bridge nor, in part, in the endpoint's buffer.
-void MixedRig::try_bytes(const std::function<bool()> &usb_step)
+// Only with no frame under way: neither in the bridge nor, in part, in the endpoint's buffer. False: the registers have
+// the tick, for the host had something else for them.
+bool MixedRig::try_bytes(const std::function<bool()> &usb_step)
 {
     if (quiet_ < QUIET_TICKS || !running()) {
-        return;
+        return true;
     }
     const uint64_t packet = every_frame() ? WHISKER_FRAME_BYTES : WHISKER_LIMIT_BULK_PACKET;
-    while (frame_bytes_waiting() > 0 && frame_bytes_waiting() % packet == 0 && usb_step()) {
+    const auto whole = [this, packet] { return frame_bytes_waiting() > 0 && frame_bytes_waiting() % packet == 0; };
+    if (!before_tick(whole, usb_step)) {
+        return false;
     }
-    if (frame_bytes_waiting() > 0 || quiet_ < QUIET_TICKS) {
-        return;
+    if (frame_bytes_waiting() > 0) {
+        return true;
     }
     RtlRig::idle(REST_CYCLES);
     bytes_.go_on(bridge_.settings(), bridge_.sampling());
     microframe_ = host_.microframe();
     at_bytes_ = true;
     mark();
+    return true;
+}
+
+// What the host does within a tick, while `goes_on`, comes first here. False: it was for the registers, and so is the
+// tick: it came after the tick's start.
+bool MixedRig::before_tick(const std::function<bool()> &goes_on, const std::function<bool()> &usb_step)
+{
+    before_tick_ = true;
+    while (before_tick_ && goes_on() && usb_step()) {
+    }
+    const bool quiet = before_tick_;
+    before_tick_ = false;
+    return quiet;
+}
+
+// Of a tick that the registers were to start. False: they did not.
+bool MixedRig::finish_tick(const std::function<bool()> &usb_step)
+{
+    if (begun_) {
+        end_tick(usb_step);
+    }
+    return begun_;
 }
 
 // The data toggle and the endpoint's two buffers stay where the registers have them: the host's toggle does, too.
@@ -116,17 +141,10 @@ void MixedRig::mark()
     taken_.clear();
 }
 
-// What the host does within a tick comes first: if it is for the registers, so is the tick, and it comes after its
-// start.
 bool MixedRig::byte_tick(const std::function<bool()> &usb_step)
 {
-    in_tick_ = begun_ = true;
-    while (begun_ && usb_step()) {
-    }
-    in_tick_ = false;
-    if (!at_bytes_) {
-        begun_ ? end_tick(usb_step) : void();
-        return begun_;
+    if (!before_tick([] { return true; }, usb_step)) {
+        return finish_tick(usb_step);
     }
     if (bytes_.drained()) {
         mark();
@@ -143,9 +161,17 @@ bool MixedRig::byte_tick(const std::function<bool()> &usb_step)
 void MixedRig::disturbed()
 {
     quiet_ = 0;
-    if (!at_bytes_) {
-        return;
+    if (at_bytes_) {
+        back_to_registers();
     }
+    if (before_tick_) {
+        before_tick_ = false;
+        begun_ = begin_tick();
+    }
+}
+
+void MixedRig::back_to_registers()
+{
     at_bytes_ = false;
     bridge_.go_on(marked_);
     host_.set_microframe(marked_frame_);
@@ -159,9 +185,6 @@ void MixedRig::disturbed()
         if (!take_again(again) || i > PATIENCE) {
             throw std::runtime_error("the registers do not make the packets that the model of bytes made");
         }
-    }
-    if (in_tick_) {
-        begun_ = begin_tick();
     }
 }
 

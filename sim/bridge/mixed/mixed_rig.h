@@ -40,16 +40,19 @@ class MixedRig : public RtlRig
         uint64_t made = 0, taken = 0; // bytes
     };
 
-    void try_bytes(const std::function<bool()> &usb_step);
+    bool try_bytes(const std::function<bool()> &usb_step);
+    bool before_tick(const std::function<bool()> &goes_on, const std::function<bool()> &usb_step);
+    bool finish_tick(const std::function<bool()> &usb_step);
     void mark();
     bool byte_tick(const std::function<bool()> &usb_step);
+    void back_to_registers();
     void make_again(const Tick &tick, Again &again);
     bool take_again(Again &again);
 
     BytesModel bytes_;
     bool at_bytes_ = false;
-    bool in_tick_ = false;      // of the model, before its start
-    bool begun_ = false;        // and the registers have started it
+    bool before_tick_ = false;  // what the host asks for is of a tick that has not started
+    bool begun_ = false;        // the registers started that tick
     uint64_t rtl_ticks_;        // still to come
     uint64_t quiet_ = 0;        // ticks since anything but sampling went on
     uint64_t microframe_ = 0;   // of the host, in the model

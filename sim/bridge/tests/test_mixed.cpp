@@ -54,7 +54,6 @@ class Side
         whisker_put_u32(&report[WHISKER_REPORT_CONTROL_LANE_MASK], lane_mask);
         whisker_put_u32(&report[WHISKER_REPORT_CONTROL_TICK_PERIOD], WHISKER_LIMIT_TICK_PERIOD);
         request(SET_TYPE, SET_REPORT, report, WHISKER_REPORT_ID_CONTROL, WHISKER_REPORT_CONTROL_BYTES);
-        settle();
     }
 
     void tick(uint64_t number, const sim_field *fields)
@@ -101,11 +100,17 @@ class Side
     void end(const sim_field *fields)
     {
         run(false, 0, ALL_LANES);
-        runner_.last_tick(fields);
         settle();
+        last_tick(fields);
         request(GET_TYPE, GET_REPORT, {}, WHISKER_REPORT_ID_COUNTERS, 255);
         settle();
         runner_.check_usb();
+    }
+
+    void last_tick(const sim_field *fields)
+    {
+        runner_.last_tick(fields);
+        settle();
     }
 
     void settle()
@@ -187,19 +192,44 @@ class Pair
                     {WHISKER_CONTROL_OPTION_PATTERN, ALL_LANES ^ 2, &Side::power_cycle}};
         uint64_t number = 0;
         for (const auto &run : RUNS) {
-            const auto start = [&run](Side &side) { side.run(true, run.options, run.lane_mask); };
+            const auto start = [&run](Side &side) {
+                side.run(true, run.options, run.lane_mask);
+                side.settle();
+            };
             both(start);
             ticks(number, TICKS / 6);
             if (run.disturb && !faults_) {
                 both([&run](Side &side) { (side.*run.disturb)(); });
                 both(start);
             } else {
-                both([](Side &side) { side.run(true, WHISKER_CONTROL_OPTION_PATTERN, 3); });
+                both([](Side &side) {
+                    side.run(true, WHISKER_CONTROL_OPTION_PATTERN, 3);
+                    side.settle();
+                });
             }
             ticks(number, TICKS / 6);
             both([this](Side &side) { side.end(fields_.data()); });
-            assert_true(sides_[0].frames() == sides_[1].frames());
-            assert_true(sides_[0].answers() == sides_[1].answers());
+            compare();
+        }
+    }
+
+    // Runs of 1, 2, ... ticks, each stopped in the midst of its last but one: also where bytes were about to take over.
+    void stop_within_ticks(uint64_t runs)
+    {
+        uint64_t number = 0;
+        for (uint64_t count = 1; count <= runs; count++) {
+            both([](Side &side) {
+                side.run(true, 0, ALL_LANES);
+                side.settle();
+            });
+            ticks(number, count);
+            both([this, number](Side &side) {
+                side.run(false, 0, ALL_LANES);
+                side.tick(number, fields_.data());
+                side.last_tick(fields_.data());
+            });
+            number++;
+            compare();
         }
     }
 
@@ -209,6 +239,12 @@ class Pair
     }
 
   private:
+    void compare()
+    {
+        assert_true(sides_[0].frames() == sides_[1].frames());
+        assert_true(sides_[0].answers() == sides_[1].answers());
+    }
+
     template <typename Action> void both(Action action)
     {
         for (Side &side : sides_) {
@@ -264,6 +300,13 @@ void test_levels_mixed_give_the_same_bytes(void **)
     }
 }
 
+void test_a_stop_that_comes_within_a_tick_ends_the_run_after_the_next(void **)
+{
+    Pair pair(0);
+    pair.stop_within_ticks(40);
+    assert_true(pair.rtl_ticks(1) < pair.rtl_ticks(0)); // bytes had their turn
+}
+
 } // namespace
 
 int main(int argc, char **argv)
@@ -273,6 +316,7 @@ int main(int argc, char **argv)
     }
     const CMUnitTest tests[] = {
         cmocka_unit_test(test_levels_mixed_give_the_same_bytes),
+        cmocka_unit_test(test_a_stop_that_comes_within_a_tick_ends_the_run_after_the_next),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);
 }
