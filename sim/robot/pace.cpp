@@ -63,8 +63,11 @@ bool Patience::over(bool takes)
         since_.reset();
         return false;
     }
-    since_ = since_.value_or(now_s());
-    return now_s() - *since_ > HOST_PATIENCE_S;
+    const double now = now_s();
+    since_ = since_.value_or(now);
+    const bool over = now - *since_ > HOST_PATIENCE_S;
+    since_ = over ? now : *since_;
+    return over;
 }
 
 } // namespace bridge_sim

@@ -29,11 +29,11 @@ class Pace
     std::optional<double> origin_s_; // wall time of tick 0, once it is known
 };
 
-// How long a paced world waits for a host that takes no frames: as long as one that is alive may take.
+// When a paced world looks after a host that takes no frames.
 class Patience
 {
   public:
-    // The host takes frames, or does not: has it not for too long?
+    // The host takes frames, or does not: has it not for so long that it is time to look, once more?
     bool over(bool takes);
 
   private:

@@ -115,6 +115,7 @@ namespace
 
 constexpr uint64_t PROGRESS_TICKS = WHISKER_LIMIT_CLOCK_HZ / WHISKER_LIMIT_TICK_PERIOD;
 constexpr int IDLE_WAIT_MS = 1000;
+constexpr int HOST_WAIT_MS = 50; // for its next transfer, which wakes: to look after it as often as Patience does
 // While there is something to do: to look who has come costs as much as a tick in the model of bytes.
 constexpr unsigned STEPS_TO_LOOK = 8;
 // A command that has not ended so long after SIGTERM is killed.
@@ -167,7 +168,7 @@ int Simulation::run()
         const bool stepped = advance();
         const bool progress = deliver_completed() || stepped; // a delivery takes requests, which must not wait
         if (!progress) {
-            wait(pace_.wait_ms(tick_, IDLE_WAIT_MS));
+            wait(host_late_ ? HOST_WAIT_MS : pace_.wait_ms(tick_, IDLE_WAIT_MS));
         } else if (++steps_ % STEPS_TO_LOOK == 0) {
             wait(0);
         }
@@ -218,16 +219,20 @@ bool Simulation::wall_leads() const
 }
 
 // The bridge of a host that was stopped or killed ticks on: its FIFO overflows, until the host takes frames again or
-// the next one stops it.
+// the next one stops it. One that a busy machine lets wait is waited for.
 bool Simulation::host_allows()
 {
-    const bool ready = runner_.ready();
-    const bool away = patience_.over(ready);
-    return ready || (away && wall_leads() && port_->host_in_real_time());
+    host_late_ = !runner_.ready();
+    if (patience_.over(!host_late_)) {
+        host_away_ = !port_->host_lives();
+    }
+    host_away_ = host_away_ && host_late_;
+    return !host_late_ || (host_away_ && wall_leads());
 }
 
 bool Simulation::may_tick()
 {
+    host_late_ = false;
     return bridge_ticks() && !over_ && followers_.allows(tick_) &&
            (!create_ || create_->has(followers_.bytes_at(tick_))) && pace_.due(tick_) && host_allows();
 }

@@ -81,6 +81,8 @@ class Simulation
     Defect defect_;
     Pace pace_;
     Patience patience_;
+    bool host_late_ = false; // the tick that is due waits for it
+    bool host_away_ = false; // it will not come by itself
     std::unique_ptr<DevicePort> port_;
     std::unique_ptr<Child> child_;
     std::array<sim_field, LANES> fields_{};

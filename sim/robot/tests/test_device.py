@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,7 @@ TICKS_PER_S = 2000
 BLOCK = 40
 TIMEOUT_S = 120
 PATIENT_MS, HASTY_MS = 1000, 1  # that a client gives a transfer; a busy machine does not make the first one short
+ASLEEP_S = 1.0  # more than the world waits before it looks after its host
 
 pytestmark = pytest.mark.skipif(not SIMULATION, reason="run by CTest, which knows where the programs are")
 
@@ -71,6 +73,24 @@ def test_level_changes_nothing(tmp_path):
     gateware = stream(tmp_path / "gateware", 2, 7, 4096, PATIENT_MS)
     model = stream(tmp_path / "model", 2, 7, 4096, PATIENT_MS, "--level", "bytes")
     assert gateware == model
+
+
+@pytest.mark.parametrize("level", ["rtl", "bytes"])
+def test_a_paced_world_waits_for_a_slow_host(tmp_path, level):
+    """Its host sleeps, for it writes into a pipe that nobody reads: it lives, so nothing is lost."""
+    patient = stream(tmp_path / "patient", 1, 5, 4096, PATIENT_MS)
+    folder = tmp_path / "slow"
+    folder.mkdir()
+    os.mkfifo(folder / "stream.bin")
+    client = [CLIENT, folder / "stream.bin", 4096, PATIENT_MS]
+    words = command(folder, 1, 5, client, "--level", level, "--pace", 10)
+    with subprocess.Popen(words) as simulation:
+        with open(folder / "stream.bin", "rb", buffering=0) as pipe:
+            received = pipe.read(1)
+            time.sleep(ASLEEP_S)
+            received += pipe.readall()
+        assert simulation.wait(TIMEOUT_S) == 0
+    assert received == patient["stream.bin"]
 
 
 @pytest.mark.parametrize("level", ["rtl", "bytes"])

@@ -28,10 +28,11 @@ class DevicePort
     // The cable is pulled; every result handed over before still reaches the host.
     virtual void unplug() = 0;
 
-    // Does the host live by this machine's clock? One that is emulated may be slower: a paced world waits for it.
-    virtual bool host_in_real_time() const
+    // Will a host that takes nothing take frames again by itself? One that is slow will; one that was stopped, or that has
+    // closed the device, will not.
+    virtual bool host_lives() const
     {
-        return false;
+        return true;
     }
 
     // Readable when requests wait.

@@ -1,11 +1,16 @@
 #include "usbfs_server.h"
 
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <future>
 #include <mutex>
 #include <stdexcept>
 #include <string>
 
 #include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include "usbfs_session.h"
@@ -30,6 +35,35 @@ std::string three_digits(unsigned number)
 std::string node_of(unsigned number)
 {
     return "/dev/bus/usb/001/" + three_digits(number);
+}
+
+// The processes that are connected to umockdev's socket of a node. umockdev does not name them.
+std::vector<pid_t> clients_of(const std::string &node)
+{
+    std::vector<pid_t> found;
+    for (const auto &entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+        const int descriptor = std::stoi(entry.path().filename());
+        sockaddr_un address{};
+        socklen_t size = sizeof address - 1;
+        ucred peer{};
+        socklen_t room = sizeof peer;
+        if (getsockname(descriptor, reinterpret_cast<sockaddr *>(&address), &size) == 0 &&
+            address.sun_family == AF_UNIX && std::string(address.sun_path).find(node) != std::string::npos &&
+            getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &peer, &room) == 0 && peer.pid != getpid()) {
+            found.push_back(peer.pid);
+        }
+    }
+    return found;
+}
+
+// Neither dead nor stopped, by its state as of proc(5).
+bool is_going_on(pid_t process)
+{
+    std::ifstream stat("/proc/" + std::to_string(process) + "/stat");
+    std::string text;
+    std::getline(stat, text);
+    const size_t name_end = text.rfind(") ");
+    return name_end != std::string::npos && std::string("TtZXx").find(text[name_end + 2]) == std::string::npos;
 }
 
 std::string hexadecimal(const Bytes &bytes)
@@ -181,9 +215,10 @@ UsbfsServer::~UsbfsServer()
     g_object_unref(state_->handler);
 }
 
-bool UsbfsServer::host_in_real_time() const
+bool UsbfsServer::host_lives() const
 {
-    return true;
+    const std::vector<pid_t> clients = clients_of(node_of(state_->number));
+    return std::any_of(clients.begin(), clients.end(), is_going_on);
 }
 
 int UsbfsServer::wake_descriptor() const

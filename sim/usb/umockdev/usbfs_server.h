@@ -26,7 +26,8 @@ class UsbfsServer : public DevicePort
     // Removes it and notifies udev's listeners. Who has it open gets ENODEV once every result handed over is fetched.
     void unplug() override;
 
-    bool host_in_real_time() const override;
+    // By the kernel's word about the processes that have the device open, so that the machine's speed decides nothing.
+    bool host_lives() const override;
     int wake_descriptor() const override;
     std::vector<DeviceRequest> take_requests() override;
     void deliver(std::vector<Urb> completed) override;
