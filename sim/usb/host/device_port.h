@@ -28,8 +28,7 @@ class DevicePort
     // The cable is pulled; every result handed over before still reaches the host.
     virtual void unplug() = 0;
 
-    // Will a host that takes nothing take frames again by itself? One that is slow will; one that was stopped, or that has
-    // closed the device, will not.
+    // Will a host that takes nothing take frames again by itself? Not one that was stopped or has left.
     virtual bool host_lives() const
     {
         return true;
