@@ -52,7 +52,7 @@ static struct nav_motion gap_assume(struct nav_gaps *g, struct nav_pose before, 
 {
     double unusual = fmin(missing / SAME_ROWS, 1.0);
     struct nav_pose each = gap_scaled(gap_between(before, after), 1.0 - unusual);
-    g->kept[g->count++ % NAV_GAPS_KEPT] = (struct nav_gap){from_s, until_s, each};
+    g->kept[g->count++ % NAV_GAPS_KEPT] = (struct nav_gap){from_s, until_s, each, missing};
     return (struct nav_motion){
         .step = gap_scaled(each, missing),
         .unknown_m = missing * (gap_apart(before, after) / 2.0 + unusual * g->usual_m),
@@ -80,12 +80,13 @@ struct nav_motion nav_gaps_bridge(struct nav_gaps *g, const struct nav_pose *ste
     return motion;
 }
 
-struct nav_motion nav_gaps_fill(const struct nav_gaps *g, struct nav_pose step, double t_s)
+struct nav_motion nav_gaps_fill(struct nav_gaps *g, struct nav_pose step, double t_s)
 {
     for (int n = 0; n < NAV_GAPS_KEPT; n++) {
-        const struct nav_gap *gap = &g->kept[n];
-        if (t_s <= gap->from_s || t_s >= gap->until_s)
+        struct nav_gap *gap = &g->kept[n];
+        if (t_s <= gap->from_s || t_s >= gap->until_s || gap->missing == 0)
             continue;
+        gap->missing--;
         step = (struct nav_pose){step.x - gap->each.x, step.y - gap->each.y, step.theta - gap->each.theta};
         break;
     }

@@ -13,6 +13,7 @@ enum { NAV_GAPS_KEPT = 16 };
 struct nav_gap {
     double from_s, until_s; /* times of the rows around it */
     struct nav_pose each;   /* motion assumed for each missing row */
+    int missing;            /* rows that have not come since */
 };
 
 struct nav_gaps {
@@ -33,6 +34,6 @@ struct nav_motion nav_gaps_bridge(struct nav_gaps *, const struct nav_pose *step
                                   double until_s);
 
 /* What a row that comes late adds to what was assumed. */
-struct nav_motion nav_gaps_fill(const struct nav_gaps *, struct nav_pose step, double t_s);
+struct nav_motion nav_gaps_fill(struct nav_gaps *, struct nav_pose step, double t_s);
 
 #endif

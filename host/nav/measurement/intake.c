@@ -42,21 +42,48 @@ void nav_intake_free(struct nav_intake *in)
     nav_repeat_free(&in->repeat);
 }
 
-enum arrival { ON_TIME, LATE, REPEATED };
+/* SAME: another row with the latest stamp, as of a clock that stands or has a coarse step. REPEATED: the same row. */
+enum arrival { ON_TIME, SAME, LATE, REPEATED };
 
-static enum arrival intake_arrival_of(struct nav_intake *in, double t_s)
+static uint64_t intake_mix(uint64_t mark, const double *numbers, int count)
 {
-    if (!isfinite(t_s)) {
+    for (int n = 0; n < count; n++) {
+        uint64_t bits;
+        memcpy(&bits, &numbers[n], sizeof bits);
+        mark = (mark ^ bits) * 0x9e3779b97f4a7c15u; /* 2^64 by the golden ratio: an odd number without a pattern */
+        mark ^= mark >> 32;
+    }
+    return mark;
+}
+
+/* A number that two rows share only when they are the same row: noise makes no two of them alike. */
+static uint64_t intake_mark(const struct nav_intake *in, const struct nav_row *row)
+{
+    uint64_t mark = intake_mix(intake_mix(0, &row->t_s, 1), row->odometry, 3);
+    for (int w = 0; w < in->sensors.count; w++) {
+        const struct nav_model *model = &in->sensors.model[w];
+        const double *cells = model->kind->cells(model, row);
+        mark = intake_mix(mark, cells, cells ? model->values : 0);
+    }
+    return mark;
+}
+
+static enum arrival intake_arrival_of(struct nav_intake *in, const struct nav_row *row)
+{
+    if (!isfinite(row->t_s)) {
         in->bad_cells++;
         return ON_TIME;
     }
-    long known = in->rows < NAV_TIMES_KEPT ? in->rows : NAV_TIMES_KEPT;
+    uint64_t mark = intake_mark(in, row);
+    long known = in->rows < NAV_ROWS_KEPT ? in->rows : NAV_ROWS_KEPT;
     for (long i = 0; i < known; i++) {
-        if (in->times[i] == t_s)
+        if (in->marks[i] == mark)
             return REPEATED;
     }
-    in->times[in->rows++ % NAV_TIMES_KEPT] = t_s;
-    return t_s < in->latest ? LATE : ON_TIME;
+    in->marks[in->rows++ % NAV_ROWS_KEPT] = mark;
+    if (row->t_s == in->latest)
+        return SAME;
+    return row->t_s < in->latest ? LATE : ON_TIME;
 }
 
 static bool intake_odometry_ok(struct nav_intake *in, const double odometry[3])
@@ -72,15 +99,18 @@ static bool intake_odometry_ok(struct nav_intake *in, const double odometry[3])
 static struct nav_motion intake_take_odometry(struct nav_intake *in, const struct nav_row *row, enum arrival arrival)
 {
     struct nav_pose step = {row->odometry[0], row->odometry[1], row->odometry[2]};
-    bool known = intake_odometry_ok(in, row->odometry), timed = isfinite(row->t_s) != 0;
+    bool known = intake_odometry_ok(in, row->odometry);
     if (arrival == LATE && known)
         return nav_gaps_fill(&in->gaps, step, row->t_s);
     if (arrival == LATE)
         return (struct nav_motion){.unknown_m = 0.0}; /* assumed when it did not come */
     double before = in->latest;
-    bool bridged = timed && in->problem->settings.motion.gaps >= 0.5;
-    int missing = bridged ? nav_gaps_missing(&in->gaps, before, row->t_s) : 0;
-    if (timed)
+    int missing = 0;
+    bool onward = arrival == ON_TIME && isfinite(row->t_s);
+    if (onward && in->problem->settings.motion.gaps >= 0.5)
+        missing = nav_gaps_missing(&in->gaps, before + in->untimed * in->gaps.period_s, row->t_s);
+    in->untimed = onward ? 0 : in->untimed + 1;
+    if (onward)
         in->latest = row->t_s;
     return nav_gaps_bridge(&in->gaps, known ? &step : NULL, missing, before, row->t_s);
 }
@@ -130,13 +160,14 @@ bool nav_intake_take(struct nav_intake *in, const struct nav_row *row, struct na
 {
     *motion = (struct nav_motion){.unknown_m = 0.0};
     *evidence = (struct nav_evidence){.reading = in->reading, .weight = in->weight, .track = in->track};
-    enum arrival arrival = intake_arrival_of(in, row->t_s);
+    enum arrival arrival = intake_arrival_of(in, row);
     if (arrival != ON_TIME)
         in->bad_rows++;
     if (arrival == REPEATED)
         return false;
     *motion = intake_take_odometry(in, row, arrival);
     intake_add_path(in, motion);
-    /* A late row's motion is real, but its readings belong to a pose that is gone. */
+    /* The motion of a row out of order is real, but its readings belong to a pose that is gone, or that nobody knows.
+     */
     return arrival == ON_TIME && intake_take_readings(in, row);
 }

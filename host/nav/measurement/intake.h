@@ -10,15 +10,16 @@
 #include "motion.h"
 #include "problem.h"
 
-enum { NAV_TIMES_KEPT = 64 };
+enum { NAV_ROWS_KEPT = 64 };
 
 struct nav_intake {
     const struct nav_problem *problem;
     uint64_t bad_cells, bad_rows;
-    uint64_t empty;               /* windows that call all textures equally likely */
-    double times[NAV_TIMES_KEPT]; /* of the last rows, to know a repeated one */
+    uint64_t empty;                /* windows that call all textures equally likely */
+    uint64_t marks[NAV_ROWS_KEPT]; /* of all numbers of the last rows, to know one that is delivered twice */
     long rows;
     double latest; /* s */
+    int untimed;   /* rows since whose motion is known, but not their time: they are not missing */
     struct nav_gaps gaps;
     struct nav_sensors sensors;
     struct nav_track *track; /* [sensors] */

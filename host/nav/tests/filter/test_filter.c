@@ -188,6 +188,55 @@ static void odometry_is_never_taken_twice_nor_dropped(void **state)
     nav_intake_free(&in);
 }
 
+/* Sums of the motion of rows that drive 10 mm and a little each, of which no two are alike. */
+static struct nav_motion taken_at(const double *times, int count, uint64_t *bad_rows, int *read)
+{
+    struct nav_problem p = room();
+    struct nav_intake in;
+    nav_intake_init(&in, &p);
+    const double nothing = INFINITY;
+    struct nav_motion sum = {.unknown_m = 0.0};
+    *read = 0;
+    for (int i = 0; i < count; i++) {
+        struct nav_row row = row_at(times[i], READ, &nothing);
+        row.odometry[1] = 1e-9 * i;
+        struct taken t = take(&in, &row);
+        *read += t.news;
+        sum.step.x += t.motion.step.x;
+        sum.unknown_m += t.motion.unknown_m;
+    }
+    *bad_rows = in.bad_rows;
+    nav_intake_free(&in);
+    return sum;
+}
+
+static void motion_counts_whatever_the_stamp_is(void **state)
+{
+    (void)state;
+    static const struct {
+        double times[8];
+        int read;
+    } clocks[] = {
+        {{0, 0, 0, 0, 0, 0, 0, 0}, 1},                    /* stands */
+        {{0.2, 0.2, 0.4, 0.4, 0.6, 0.6, 0.8, 0.8}, 4},    /* of a coarse step: nothing is missing between its steps */
+        {{1, 1, 1, 1, 1, 1, 1.5, 1.6}, 3},                /* the same, six to a step */
+        {{0.1, 0.2, NAN, 0.4, NAN, NAN, 0.7, 0.8}, 8},    /* without a stamp now and then */
+        {{5.1, 5.2, 5.3, 0.4, 0.5, 0.6, 0.7, 0.8}, 3},    /* set back */
+        {{0.1, 0.2, 0.4, 0.3, 0.3, 0.5, 0.6, 0.7}, 6},    /* two late with one stamp */
+        {{NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN}, 8},    /* none */
+        {{-5.0, -4.9, -4.8, 0.0, 0.1, 0.2, 0.3, 0.4}, 8}, /* a jump ahead: nobody knows what was in it */
+    };
+    for (size_t n = 0; n < sizeof clocks / sizeof clocks[0]; n++) {
+        uint64_t bad;
+        int read;
+        struct nav_motion sum = taken_at(clocks[n].times, 8, &bad, &read);
+        assert_near(sum.step.x, 0.08, 1e-12);
+        assert_int_equal(read, clocks[n].read);
+        assert_int_equal(bad, 8 - read);
+        assert_true((sum.unknown_m > 1e-6) == (n == 5 || n == 7)); /* where rows were missing for a while */
+    }
+}
+
 static void every_filter_is_listed_and_no_other_name_is_taken(void **state)
 {
     (void)state;
@@ -385,6 +434,7 @@ int main(void)
         cmocka_unit_test(bad_cells_are_counted_and_not_read),
         cmocka_unit_test(a_window_that_favours_no_texture_is_not_read),
         cmocka_unit_test(odometry_is_never_taken_twice_nor_dropped),
+        cmocka_unit_test(motion_counts_whatever_the_stamp_is),
         cmocka_unit_test(every_filter_is_listed_and_no_other_name_is_taken),
         cmocka_unit_test(no_row_makes_any_filter_say_nonsense),
         cmocka_unit_test(nothing_read_makes_no_filter_surer),
