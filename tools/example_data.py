@@ -1,4 +1,4 @@
-"""Makes the small data set that `whisker examples` unpacks: host/python/crunchbot/data/examples.zip.
+"""Makes the small data set that `whisker examples` unpacks, and the bag that `whisker try` plays: host/python/crunchbot/data.
 
 Everything is simulated: a scene at level 0, a robot's floor and object whiskers at level 1, a recording of the simulated
 bridge. The node's image is the committed one.
@@ -11,10 +11,15 @@ import sys
 import tempfile
 import time
 import zipfile
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
+from crunchbot.recording.mcapfile import McapFile
+from crunchbot.recording.writing import TopicWriter
+from crunchbot.robot.network.messages import SCHEMAS, decode, type_of
+from crunchbot.robot.played import RECORD, SCENE_FILES
 from crunchbot.scene import load
 from crunchbot_lab.demo.training import flat
 from crunchbot_lab.scenes.files import write_scene
@@ -30,13 +35,16 @@ from crunchbot_lab.signals.world import TICK_S
 from crunchbot_lab.simulation.scenes import make_scene as demo_scene
 
 ROOT = Path(__file__).resolve().parents[1]
-ZIP = ROOT / "host/python/crunchbot/data/examples.zip"
+DATA = ROOT / "host/python/crunchbot/data"
+ZIP, MINUTE = DATA / "examples.zip", DATA / "first_minute.mcap"
 FAMILY, ROWS, SEED = "anchor", 600, 7
 MAP_M = 0.05
 SPEEDS_M_S, SWEEP_S = (0.1, 0.15, 0.2), 4.0
 REPEATS, PUSH_S = 2, 0.4
 RECORDED_S = 2
 WHISKER = (sys.executable, "-m", "crunchbot.cli")
+SHOWN = ("observation", "localisation", "belief", "contact", "behaviour", "truth", "health")
+SHOWN_FILTER, BELIEF_EACH = "adaptive", 4
 EPOCH = (2026, 1, 1, 0, 0, 0)  # of every entry: the same content is the same file
 
 
@@ -111,6 +119,40 @@ def make_recording(path: Path) -> None:
         bridge.wait()
 
 
+def make_minute(folder: Path, path: Path) -> None:
+    """The bag of the demo with what the page shows of one filter: every row, and a belief every two seconds."""
+    build = ["--build-dir", ROOT / "build/release", "--spread", "1"]
+    subprocess.run([sys.executable, "-m", "crunchbot_lab.demo", "--out", folder / "demo", *build], cwd=ROOT, check=True)
+    path.unlink(missing_ok=True)
+    with McapFile(folder / "demo/robot.mcap") as bag, TopicWriter(path, RECORD, told_first(bag)) as writer:
+        seen: Counter[str] = Counter()
+        for message in bag.messages():
+            topic = message.topic.removeprefix("/robot/")
+            if topic == message.topic or not shown(topic, bytes(message.data), seen):
+                continue
+            if seen[topic] == 1:
+                writer.topic(message.topic, SCHEMAS[type_of(topic)])
+            writer.add(message.topic, message.log_time, bytes(message.data))
+        writer.finish()
+
+
+def told_first(bag: McapFile) -> dict[str, str]:
+    """What the bag's record of the robot said at its beginning."""
+    return {
+        key: value for key, value in bag.metadata[RECORD].items() if key in ("format", "robot", "started", *SCENE_FILES)
+    }
+
+
+def shown(topic: str, data: bytes, seen: Counter[str]) -> bool:
+    """Whether the page needs it; counts it."""
+    if topic.partition("/")[0] not in SHOWN:
+        return False
+    if topic in ("localisation", "belief") and decode(type_of(topic), data, topic).filter != SHOWN_FILTER:
+        return False
+    seen[topic] += 1
+    return topic != "belief" or (seen[topic] - 1) % BELIEF_EACH == 0
+
+
 def pack(folder: Path, path: Path) -> None:
     """All files of a folder in a zip whose bytes follow from theirs."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
@@ -131,7 +173,9 @@ def main() -> int:
         make_recording(folder / "drive.mcap")
         shutil.copyfile(ROOT / "firmware/images/node.whex", folder / "node.whex")
         pack(folder, ZIP)
-    print(f"{ZIP.relative_to(ROOT)}: {ZIP.stat().st_size / 1e3:.0f} kB")
+        make_minute(folder, MINUTE)
+    for path in (ZIP, MINUTE):
+        print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1e3:.0f} kB")
     return 0
 
 

@@ -21,6 +21,7 @@ from .lab import import_lab
 
 # name (its module has underscores for dashes): what it does
 COMMANDS = {
+    "try": "a minute of a robot in the browser, with a tour",
     "examples": "a small data set, with which every example works",
     "info": "what ring, daemon and bridge say of themselves",
     "top": "lanes, rates and losses in the terminal",
@@ -50,7 +51,7 @@ COMMANDS = {
 # Commands that need more than numpy: the extra that installs it
 EXTRAS = {
     **dict.fromkeys(("record", "replay"), "record"),
-    "view": "view",
+    **dict.fromkeys(("try", "view"), "view"),
     **dict.fromkeys(("robot", "pilot", "navigator", "mapper", "bag", "pyro", "top"), "robot"),
     **{name: name for name in ("export", "ros2", "foxglove")},
     **dict.fromkeys(("localise", "map", "calibrate", "scene"), "scenes"),

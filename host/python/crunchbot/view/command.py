@@ -90,8 +90,8 @@ def _address(text: str) -> str:
         raise argparse.ArgumentTypeError(f"{text} is not an address; give one such as 127.0.0.1") from None
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Serve until interrupted or terminated."""
+def run(arguments: argparse.Namespace, part: str = "") -> int:
+    """Serve until interrupted or terminated. part: what follows the page's address, as "#tour"."""
     logging.getLogger("crunchbot.view").addHandler(logging.NullHandler())
     rings = [] if arguments.file else list(dict.fromkeys(arguments.ring or [RING]))
     for name in rings:
@@ -104,7 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
         played = read_bag(arguments.file, [topic.removesuffix("/*") for topic in WANTED])
         source, scene = Playback(played), scene or played.scene
     try:
-        return asyncio.run(_serve(arguments, Hub(rings, source, scene, arguments.ring_owner, may_set_pose)))
+        return asyncio.run(_serve(arguments, Hub(rings, source, scene, arguments.ring_owner, may_set_pose), part))
     finally:
         source.close()
 
@@ -121,7 +121,7 @@ def _source(arguments: argparse.Namespace) -> NoRobot:
     return join(arguments.robot or ROBOT, arguments.connect, config) if asked else NoRobot()
 
 
-async def _serve(arguments: argparse.Namespace, hub: Hub) -> int:
+async def _serve(arguments: argparse.Namespace, hub: Hub, part: str) -> int:
     over, loop = asyncio.Event(), asyncio.get_running_loop()
 
     def end() -> None:
@@ -134,7 +134,7 @@ async def _serve(arguments: argparse.Namespace, hub: Hub) -> int:
         if not address.is_loopback:
             print(f"whisker-view: {arguments.host}: anyone who reaches this address can watch", file=sys.stderr)
         host = "127.0.0.1" if address.is_unspecified else f"[{address}]" if address.version == 6 else str(address)
-        url = f"http://{host}:{port}/"
+        url = f"http://{host}:{port}/{part}"
         print(url, flush=True)
         if arguments.open:
             webbrowser.open(url)

@@ -16,6 +16,7 @@ SCRIPTS = (  # in the order they need each other
         "words.js",
         "pose.js",
         "player.js",
+        "tour.js",
         "robot.js",
         "parts.js",
         "main.js",

@@ -21,6 +21,7 @@ const wire = new Wire((up) => {
   if (!up) panels.status({ state: 'gone', ring: view.ring }, []);
 });
 const robotPart = new RobotPart(wire);
+const tour = new Tour();
 const parts = new Parts((part) => {
   robotPart.look(part === 'robot');
   if (traces) look();
@@ -118,6 +119,7 @@ wire.on('hello', (hello) => {
   panels.hello(hello);
   robotPart.poseTool.hello(hello);
   robotPart.player.hello(hello);
+  tour.hello(hello, wanted.has('tour'));
   if (hello.playback) parts.choose('robot', false);
   else if (!parts.chosen) parts.choose(hello.robot ? 'robot' : 'traces', false);
   if (!traces) {
