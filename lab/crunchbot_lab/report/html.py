@@ -67,6 +67,11 @@ def section(title: str, *parts: str) -> str:
     return f'<section class="card"><h2>{escape(title)}</h2>{"".join(parts)}</section>'
 
 
+def folded(title: str, *parts: str) -> str:
+    """A card that shows its heading until it is opened."""
+    return f'<details class="card"><summary><h2>{escape(title)}</h2></summary>{"".join(parts)}</details>'
+
+
 def paragraph(text: str) -> str:
     return f"<p>{escape(text)}</p>"
 

@@ -29,7 +29,6 @@ def render(run: Run) -> str:
     path = "The arena from above. Grey blocks with a border are obstacles; dots mark where the robot was while an estimate was lost."
     lost = f"Beyond {LOST_M:g} m an estimate counts as lost."
     parts = [
-        origin_card(run),
         _tiles(s),
         section("Where it was", figure(long_figures.path, run, spoken.arena(run), path)),
         section(
@@ -40,6 +39,7 @@ def render(run: Run) -> str:
         ),
         section("What it met", _counts_table(s)),
         *chain_cards(run),
+        origin_card(run),
     ]
     return document(f"CrunchBot: {s['simulated_s'] / 60:g} minutes, seed {s['seed']}", lead, parts)
 

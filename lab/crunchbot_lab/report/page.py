@@ -7,7 +7,7 @@ import numpy as np
 
 from . import figures, motion, spoken
 from .figures import TITLES
-from .html import document, figure, pairs, paragraph, percent, script, section, table, tiles
+from .html import document, figure, folded, pairs, paragraph, percent, script, section, table, tiles
 from .long_figures import LOST_M
 from .run import FILTERS, Run
 
@@ -35,29 +35,17 @@ def render(run: Run) -> str:
     """The page as text."""
     s = run.summary
     parts = [
-        origin_card(run),
+        f'<p class="verdict">{escape(_verdict(run))}</p>',
         _tiles(s),
         motion.card(run),
-        section(
-            "What each filter is",
-            '<dl class="filters">'
-            + "".join(f"<div><dt>{TITLES[n]}</dt><dd>{WHAT[n]}</dd></div>" for n in FILTERS)
-            + "</dl>",
-        ),
+        *_spread(run),
         section(
             "How far off",
             figure(figures.errors, run, spoken.errors(run), "Every row counts from the first."),
             _estimates_table(run),
-        ),
-        *_spread(run),
-        section(
-            "The whole way",
-            figure(
-                figures.arena,
-                run,
-                spoken.arena(run),
-                "The arena from above. Grey blocks with a border are obstacles. The belief starts 0.2 m and 10 degrees wrong.",
-            ),
+            '<dl class="filters">'
+            + "".join(f"<div><dt>{TITLES[n]}</dt><dd>{WHAT[n]}</dd></div>" for n in FILTERS)
+            + "</dl>",
         ),
         section("Floor texture", figure(figures.texture, run, spoken.texture(run), _texture_caption(s))),
         section(
@@ -74,6 +62,7 @@ def render(run: Run) -> str:
         *chain_cards(run),
         f'<p class="lead">Every topic of the run, for ROS 2 tools and Foxglove: <code>{escape(run.bag.name)}</code>, '
         "beside this page.</p>",
+        origin_card(run),
         script(),
     ]
     return document(f"CrunchBot: from magnet to pose, seed {s['seed']}", _lead(s), parts)
@@ -95,7 +84,22 @@ def chain_cards(run: Run) -> list[str]:
     if not run.navigator:
         return []
     sheets = "".join((loss_table(run.summary), network_table(run), base_table(run)))
-    return [section("Throughput, loss, base", f'<div class="sheets">{sheets}</div>')]
+    return [folded("Throughput, loss, base", f'<div class="sheets">{sheets}</div>')]
+
+
+def _verdict(run: Run) -> str:
+    """The result in a sentence: this run's, and what other seeds make of it."""
+    medians = {name: 1000 * np.median(run.position_error(name)) for name in FILTERS}
+    here = f"{medians['adaptive']:.0f} mm median position error by touch; wheels alone {medians['odometry']:.0f} mm"
+    text = f"{here}; the paper's filter {medians['foveal']:.0f} mm"
+    if not run.seeds:
+        return f"{text}."
+    seeds = {name: 1000 * run.seeds[f"{name}_m"] for name in FILTERS}
+    median = {name: f"{np.median(errors):.0f} mm" for name, errors in seeds.items()}
+    return (
+        f"{text}. Medians of {len(run.seeds['seed'])} seeds: {median['adaptive']} by touch, worst "
+        f"{seeds['adaptive'].max():.0f} mm; {median['odometry']} by wheels alone; {median['foveal']} by the paper's filter."
+    )
 
 
 def _lead(s: dict) -> str:
@@ -111,7 +115,11 @@ def _tiles(s: dict) -> str:
     return tiles(
         [
             (f"{s['adaptive_error_median_m'] * 1000:.0f} mm", "median position error, adaptive", False),
-            (percent(s["texture_accuracy"]), "texture windows right", False),
+            (
+                percent(s["texture_accuracy_all"]),
+                f"texture windows right; {percent(s['texture_accuracy'])} where 50 mm inside a tile",
+                False,
+            ),
             (f"{s['frames_lost']}", f"frames lost of {s['frames_sent']:,}", s["frames_lost"] > 0),
             (
                 f"{reported} of {injected}" if equal else "NOT EQUAL",

@@ -124,3 +124,4 @@ class Motion {
 }
 
 globalThis.motion = new Motion(JSON.parse($('motion-data').textContent));
+if (!matchMedia('(prefers-reduced-motion: reduce)').matches) motion.play(true);
