@@ -33,7 +33,7 @@ std::string TruthLog::header() const
 
 void TruthLog::row(uint64_t tick, const sim_world *world)
 {
-    const sim_pose pose = sim_world_pose(world);
+    const sim_pose pose = sim_scene_on_map(&scene_, sim_world_pose(world));
     char text[CELLS];
     std::snprintf(text, sizeof text, "%" PRIu64 ",%.6f,%.6f,%.6f", tick, pose.x, pose.y, pose.theta);
     std::string cells = text;

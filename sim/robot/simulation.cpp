@@ -293,7 +293,7 @@ void Simulation::after_tick(uint64_t tick)
         double y_m = 0;
         double theta_rad = 0;
         truth_.row(tick, world_.get());
-        followers_.send_truth(tick, sim_world_pose(world_.get()));
+        followers_.send_truth(tick, sim_scene_on_map(&scene_, sim_world_pose(world_.get())));
         sim_world_odometry(world_.get(), &x_m, &y_m, &theta_rad);
         if (!create_) {
             followers_.send_odometry(tick, x_m, y_m, theta_rad);

@@ -9,6 +9,7 @@
 
 #include "mech_floor.h"
 #include "scene_text.h"
+#include "sim_angle.h"
 #include "whisker_constants.h"
 
 struct reader {
@@ -165,14 +166,24 @@ static int sim_scene_read_object_whisker(struct reader *reader)
     return 0;
 }
 
-static int sim_scene_read_start(struct reader *reader)
+static int sim_scene_read_pose(struct reader *reader, struct sim_pose *pose)
 {
     double v[3] = {0};
     if (sim_text_numbers(&reader->text, 1, 3, v))
         return -1;
-    reader->scene->start = (struct sim_pose){v[0], v[1], v[2]};
-    reader->has_start = true;
+    *pose = (struct sim_pose){v[0], v[1], v[2]};
     return 0;
+}
+
+static int sim_scene_read_start(struct reader *reader)
+{
+    reader->has_start = true;
+    return sim_scene_read_pose(reader, &reader->scene->start);
+}
+
+static int sim_scene_read_origin(struct reader *reader)
+{
+    return sim_scene_read_pose(reader, &reader->scene->origin);
 }
 
 static int sim_scene_read_mechanics(struct reader *reader)
@@ -216,6 +227,7 @@ static const struct item {
     {"texture_whisker", 3, 0, sim_scene_read_texture_whisker},
     {"object_whisker", 5, 0, sim_scene_read_object_whisker},
     {"start", 3, 0, sim_scene_read_start},
+    {"origin", 3, 0, sim_scene_read_origin},
     {"mechanics", 1, 0, sim_scene_read_mechanics},
     {"batch", 1, 0, sim_scene_read_batch},
 };
@@ -283,6 +295,15 @@ static int sim_scene_finish(struct reader *reader)
     if (start->x < 0 || start->x > scene->size_x || start->y < 0 || start->y > scene->size_y)
         return sim_text_refuse(&reader->text, "start: (%g, %g) is outside the walls; move it", start->x, start->y);
     return sim_scene_lay_floor(reader);
+}
+
+struct sim_pose sim_scene_on_map(const struct sim_scene *scene, struct sim_pose pose)
+{
+    const struct sim_pose *origin = &scene->origin;
+    double c = cos(origin->theta);
+    double s = sin(origin->theta);
+    return (struct sim_pose){origin->x + c * pose.x - s * pose.y, origin->y + s * pose.x + c * pose.y,
+                             remainder(pose.theta + origin->theta, 2 * SIM_PI)};
 }
 
 int sim_scene_parse(const char *text, const char *source, struct sim_scene *scene, char *error, size_t error_size)

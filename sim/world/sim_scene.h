@@ -72,9 +72,13 @@ struct sim_scene {
     size_t whiskers;
     struct sim_whisker whisker[SIM_WHISKERS_MAX];
     struct sim_pose start;
+    struct sim_pose origin; /* of the arena's frame on the map, in which poses are told */
     enum sim_mechanics mechanics;
     uint32_t batch;
 };
+
+/* A pose of the arena's frame on the map. */
+struct sim_pose sim_scene_on_map(const struct sim_scene *scene, struct sim_pose pose);
 
 /* Reads a scene from text. Returns 0, or -1 with one line in error that names the source, the line and the remedy. */
 int sim_scene_parse(const char *text, const char *source, struct sim_scene *scene, char *error, size_t error_size);

@@ -1,7 +1,7 @@
 """Occupancy maps: an image and a YAML file, as ROS map servers read them. Solid and unknown cells become boxes.
 
-Frames: a map's own frame, of which `origin` is the pose of the image's lower left corner; and the image's frame, with
-that corner as origin, which is the arena's where there is no arena.toml.
+Frames: a map's own frame, in which `origin` is the pose of the image's lower left corner; and the image's frame, with
+that corner as origin. An arena's frame has a place in a map's likewise: `to_map` and `from_map` are the way, for all.
 """
 
 import math
@@ -123,11 +123,13 @@ def _scaled(boxes: list[tuple[int, int, int, int]], rows: int, metres: float) ->
     )
 
 
-def placed(occupancy: Occupancy, size_m: tuple[float, float]) -> tuple[tuple[Box, ...], tuple[Box, ...]]:
-    """Solid and unknown boxes in an arena of this size, whose frame is the map's own; around the map nothing is known."""
-    x, y, yaw = occupancy.origin
+def placed(
+    occupancy: Occupancy, size_m: tuple[float, float], origin: Pose = NOWHERE
+) -> tuple[tuple[Box, ...], tuple[Box, ...]]:
+    """Solid and unknown boxes in an arena of this size and origin; around the map nothing is known."""
+    x, y, yaw = np.round(from_map(np.array([occupancy.origin]), origin)[0], 9).tolist()
     if yaw != 0.0:
-        raise ValueError("field 'origin': the yaw must be 0 beside an arena.toml")
+        raise ValueError(f"field 'origin': the yaw must be that of the origin in arena.toml, {origin[2]:g}")
     high_x, high_y = x + occupancy.size_m[0], y + occupancy.size_m[1]
     wide, high = size_m
     margins = [(0.0, 0.0, x, high), (high_x, 0.0, wide, high), (x, 0.0, high_x, y), (x, high_y, high_x, high)]
@@ -143,7 +145,9 @@ def _clipped(boxes: list[Box], size_m: tuple[float, float]) -> tuple[Box, ...]:
 
 
 def to_map(poses: np.ndarray, origin: Pose) -> np.ndarray:
-    """Poses (n, 3) of the image's frame in the map's own; headings stay in -pi .. pi."""
+    """Poses (n, 3) of a frame as those of the map in which it has this origin; headings stay in -pi .. pi."""
+    if origin == NOWHERE:
+        return poses
     x, y, yaw = origin
     cosine, sine = math.cos(yaw), math.sin(yaw)
     turned = np.remainder(poses[:, 2] + yaw + math.pi, 2 * math.pi) - math.pi
@@ -156,3 +160,12 @@ def from_map(poses: np.ndarray, origin: Pose) -> np.ndarray:
     x, y, yaw = origin
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return to_map(poses, (-cosine * x - sine * y, sine * x - cosine * y, -yaw))
+
+
+def spread_on_map(covariances: np.ndarray, origin: Pose) -> np.ndarray:
+    """Covariances (n, 3, 3) of x, y and heading, turned as `to_map` turns their poses."""
+    if origin == NOWHERE:
+        return covariances
+    cosine, sine = math.cos(origin[2]), math.sin(origin[2])
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return turn @ covariances @ turn.T

@@ -1,6 +1,7 @@
 """Scene folders: arena.toml, robot.toml, prior.toml. Read strictly; every complaint is one line with file and remedy.
 
-Metres and radians. World frame: origin in the arena's lower left corner, x right, y up. Robot frame: x forward, y left.
+Metres and radians. Arena frame: origin in the arena's lower left corner, x right, y up; its place on the map is `origin`.
+Poses of a robot (prior, truth, estimates, messages) are on the map. Robot frame: x forward, y left.
 """
 
 import math
@@ -15,8 +16,8 @@ from . import observation
 from .files import UnreadableError
 from .images import nearest_levels, read_grey
 from .observation import Column, Layout, Quantity
-from .occupancy import NOWHERE, Box, Pose, from_map, placed, read_map
-from .scene_table import LARGEST_M, SceneError, Table
+from .occupancy import NOWHERE, Box, Pose, from_map, placed, read_map, spread_on_map, to_map
+from .scene_table import FARTHEST_M, LARGEST_M, SceneError, Table
 from .sensor_tables import SensorTable, read_sensors, write_sensor
 
 __all__ = ["LARGEST_M", "SceneError"]  # beside what is defined here
@@ -96,7 +97,7 @@ class Scene:
     robot: Robot
     prior: Prior | None = None
     simulated: tuple[str, ...] = field(default=(), compare=False)  # more lines of `flat`; no part of the folder
-    origin: Pose = NOWHERE  # of the arena's frame in that of the occupancy map it was made of
+    origin: Pose = NOWHERE  # of the arena's frame in the map's
 
     @cached_property
     def layout(self) -> Layout:
@@ -112,10 +113,22 @@ class Scene:
         """What is odd but allowed, one line each."""
         if self.prior is None or self.prior.mean is None:
             return []
-        x, y, _ = self.prior.mean
-        if self.arena.is_free(x, y, 0.0):
+        if not (fault := self.fault_at(self.prior.mean)):
             return []
-        return [f"{PRIOR}: mean ({x:g}, {y:g}) is not in free space; the belief is clipped to free space"]
+        x, y, _ = self.prior.mean
+        return [f"{PRIOR}: mean ({x:g}, {y:g}) is {fault}; the belief is clipped to free space"]
+
+    def fault_at(self, pose: Pose) -> str:
+        """Where a pose on the map is, if no robot can be there; else empty."""
+        x, y, _ = from_map(np.array([pose]), self.origin)[0].tolist()
+        if self.arena.is_free(x, y, 0.0):
+            return ""
+        width, height = self.arena.size_m
+        if 0.0 <= x <= width and 0.0 <= y <= height:
+            return "in an obstacle"
+        corners = to_map(np.array([(a, b, 0.0) for a in (0.0, width) for b in (0.0, height)]), self.origin)
+        (x0, y0, _), (x1, y1, _) = corners.min(axis=0), corners.max(axis=0)
+        return f"outside the arena, which is within ({x0:.3g}, {y0:.3g}) and ({x1:.3g}, {y1:.3g})"
 
     def flat(self, start_pose: tuple[float, float, float]) -> str:
         """The text sim/world reads: one item a line."""
@@ -123,6 +136,7 @@ class Scene:
         if arena.unknown or any(NOT_KNOWN in row for row in arena.floor):
             raise SceneError(f"{ARENA}: parts of the arena are unknown; a simulated world needs to know them all")
         lines = [_line("size_m", *arena.size_m), _line("tile_m", arena.tile_m)]
+        lines += [] if self.origin == NOWHERE else [_line("origin", *self.origin)]
         lines += [_line("texture", name) for name in arena.textures] + [_line("floor", row) for row in arena.floor]
         lines += [_line("wall", arena.wall)] if arena.wall else []
         surface = dict(arena.surfaces)
@@ -138,7 +152,7 @@ def load(path: str | Path, map_file: str | Path | None = None) -> Scene:
     """Read a scene folder; prior.toml may be absent. SceneError names file, line or key, and the remedy.
 
     map_file: YAML of an occupancy map, whose boxes take the place of arena.toml's, or of all of it where there is none;
-    then poses in prior.toml are in the map's frame, and the scene's are in that of the image's lower left corner.
+    then the scene's origin is the map's.
     """
     folder = Path(path)
     if not folder.is_dir():
@@ -162,32 +176,41 @@ def load_robot(path: str | Path) -> Robot:
 def _read(folder: Path, map_file) -> Scene:
     prior = _prior(Table.read(folder / PRIOR)) if (folder / PRIOR).exists() else None
     if map_file is None or (folder / ARENA).exists():
-        arena = _arena(Table.read(folder / ARENA))
+        arena, origin = _arena(Table.read(folder / ARENA))
         robot = _robot(Table.read(folder / ROBOT), arena.size_m)
-        return Scene(arena if map_file is None else _with_map(arena, map_file), robot, prior)
+        mapped = arena if map_file is None else _with_map(arena, map_file, origin)
+        return Scene(mapped, robot, prior, origin=origin)
     occupancy = read_map(map_file)
     robot = _robot(Table.read(folder / ROBOT), occupancy.size_m)
     arena = Arena(occupancy.size_m, max(occupancy.size_m), ("NONE",), (NOT_KNOWN,), occupancy.solid, occupancy.unknown)
     feeling = replace(robot, whiskers=tuple(robot.of_role("object")))  # no floor is known for the others
-    return Scene(arena, feeling, _moved(prior, occupancy.origin), origin=occupancy.origin)
+    return Scene(arena, feeling, prior, origin=occupancy.origin)
 
 
-def _with_map(arena: Arena, map_file) -> Arena:
+def _with_map(arena: Arena, map_file, origin: Pose) -> Arena:
     try:
-        solid, unknown = placed(read_map(map_file), arena.size_m)
+        solid, unknown = placed(read_map(map_file), arena.size_m, origin)
     except ValueError as error:
         raise error if isinstance(error, SceneError) else SceneError(f"{map_file}: {error}") from error
     return replace(arena, obstacles=solid, unknown=unknown)
 
 
-def _moved(prior: Prior | None, origin: Pose) -> Prior | None:
-    """A prior in the map's frame as one in the image's."""
-    if prior is None or prior.mean is None:
+def in_arena(prior: Prior, origin: Pose) -> Prior:
+    """A prior on the map as one in the frame of an arena of this origin."""
+    if prior.mean is None or origin == NOWHERE:
         return prior
     mean = tuple(map(float, from_map(np.array([prior.mean]), origin)[0]))
-    cosine, sine = math.cos(origin[2]), math.sin(origin[2])
-    x, y, theta = prior.sigma
-    return Prior(prior.kind, mean, (math.hypot(cosine * x, sine * y), math.hypot(sine * x, cosine * y), theta))
+    back = spread_on_map(np.diag(np.square(prior.sigma))[None], (0.0, 0.0, -origin[2]))[0]
+    return Prior(prior.kind, mean, independent(back))
+
+
+def independent(covariance: np.ndarray) -> tuple[float, float, float]:
+    """Standard deviations of x, y and heading, independent, of a normal distribution that is in no direction narrower than
+    one of this covariance (3, 3): each variance grows by its shares in common with the others."""
+    sigma = np.sqrt(np.diag(covariance))
+    both = np.outer(sigma, sigma)
+    shares = np.divide(np.abs(covariance), both, out=np.zeros((3, 3)), where=both > 0.0)
+    return tuple((sigma * np.sqrt(shares.sum(axis=1))).tolist())
 
 
 def write(path: str | Path, scene: Scene) -> None:
@@ -198,6 +221,7 @@ def write(path: str | Path, scene: Scene) -> None:
     surface = dict(arena.surfaces)
     content = {"size_m": arena.size_m, "tile_m": arena.tile_m, "textures": arena.textures, "floor": arena.floor}
     content |= {"wall": arena.wall} if arena.wall else {}
+    content |= {} if scene.origin == NOWHERE else {"origin": scene.origin}
     obstacles = [_corners(box) | ({"surface": surface[box]} if box in surface else {}) for box in arena.obstacles]
     _write(folder / ARENA, content | {"obstacle": obstacles, "unknown": list(map(_corners, arena.unknown))})
     content = {key: getattr(robot, key) for key in ("body_radius_m", "odometry_relative_sigma", "radial_sigma_m")}
@@ -232,16 +256,18 @@ def _line(word: str, *values) -> str:
 TINY = 1e-9
 
 
-def _arena(table: Table) -> Arena:
+def _arena(table: Table) -> tuple[Arena, Pose]:
+    """With its origin on the map."""
     size = table.numbers("size_m", 2, TINY, LARGEST_M)
     tile = table.number("tile_m", TINY, LARGEST_M)
     textures = _textures(table)
     floor = _floor(table, size, tile, textures)
     wall = _surface(table, "wall")
+    origin = table.numbers("origin", 3, -LARGEST_M, LARGEST_M) if "origin" in table.content else NOWHERE
     surfaces: list[tuple[Box, str]] = []
     obstacles, unknown = (_boxes(table, key, size, surfaces) for key in ("obstacle", "unknown"))
     table.done()
-    return Arena(size, tile, textures, floor, obstacles, unknown, wall, tuple(surfaces))
+    return Arena(size, tile, textures, floor, obstacles, unknown, wall, tuple(surfaces)), origin
 
 
 def _surface(table: Table, key: str) -> str:
@@ -354,7 +380,7 @@ def _prior(table: Table) -> Prior:
     if kind == "uniform":
         table.done()
         return Prior(kind)
-    mean = table.numbers("mean", 3, -LARGEST_M, LARGEST_M)
+    mean = table.numbers("mean", 3, -FARTHEST_M, FARTHEST_M)
     sigma = table.numbers("sigma", 3, TINY, LARGEST_M)
     table.done()
     return Prior(kind, mean, sigma)

@@ -9,6 +9,7 @@ from .fields import Fields
 from .files import UnreadableError, read_toml
 
 LARGEST_M = 1000.0
+FARTHEST_M = 3 * LARGEST_M  # of a place on a map: as far as its arena's origin, and across the arena
 
 
 class SceneError(UserError, ValueError):

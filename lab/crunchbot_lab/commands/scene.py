@@ -5,7 +5,6 @@ import argparse
 from crunchbot.arguments import add_action, warn
 from crunchbot.nav.filters import SettingError
 from crunchbot.nav.observations import observations_path, read_observations
-from crunchbot.occupancy import from_map
 from crunchbot.scene import OBSTACLES_MOST, SceneError, load, write
 from crunchbot.tables import unwritable
 
@@ -36,7 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "put an occupancy map into a scene folder, for all commands that take one"
     p = add_action(actions, "map", text, example, with_map)
     p.add_argument(
-        "scene", help="scene folder; without arena.toml the map is the arena, seen from the image's lower left corner"
+        "scene", help="scene folder; without arena.toml the map is the arena, and its origin the arena's"
     )
     p.add_argument("map", metavar="MAP.YAML", help="a ROS map server's YAML file")
     p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
@@ -75,8 +74,6 @@ def with_map(arguments: argparse.Namespace) -> int:
         )
     path = observations_path(arguments.scene)
     observations = read_observations(path, scene) if path.exists() else None
-    if observations is not None and observations.truth is not None:
-        observations.truth = from_map(observations.truth, scene.origin)
     _write(arguments.out, scene, None if observations is None else scenes.rounded(observations))
     print(f"{arguments.out}: {arguments.scene} with {arguments.map}, {boxes} boxes")
     return 0

@@ -44,10 +44,10 @@ def data(run: Run) -> dict:
     """What the script is given."""
     scene = load(run.scene_folder)
     seconds = (run.truth["tick"] + 1) * 500e-6
-    scales = scales_of(scene)
+    scales, robot = scales_of(scene), asdict(replace(scene.robot, sensors=()))
     beliefs = recorded_beliefs(run.bag, seconds, scales) if run.bag.exists() else {}
     return {
-        "scene": {"arena": asdict(scene.arena), "robot": asdict(replace(scene.robot, sensors=())), "text": ""},
+        "scene": {"arena": asdict(scene.arena), "origin": scene.origin, "robot": robot, "text": ""},
         "truth": _poses(seconds, run.truth),
         "scales": list(scales),
         "filters": {

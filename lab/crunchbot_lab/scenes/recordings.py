@@ -1,6 +1,7 @@
 """Scenes from recordings of runs. A reader knows one kind of recording; a new kind is one more entry of READERS."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from crunchbot.errors import UserError
@@ -49,7 +50,7 @@ def _read_bag(path: Path, warn: Warn) -> tuple[Scene, Observations]:
 
 
 def _with_prior(scene: Scene, rows: Observations) -> tuple[Scene, Observations]:
-    return Scene(scene.arena, scene.robot, scene.prior or Prior("uniform")), rounded(rows)
+    return replace(scene, prior=scene.prior or Prior("uniform")), rounded(rows)
 
 
 def _is_folder_of_rows(path: Path) -> bool:

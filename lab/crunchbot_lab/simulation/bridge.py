@@ -9,7 +9,7 @@ from pathlib import Path
 from crunchbot.errors import UserError
 from crunchbot.files import UnreadableError, read_toml
 from crunchbot.pilot.behaviour import WHISK_RAD_S
-from crunchbot.scene import Scene, load
+from crunchbot.scene import Prior, Scene, in_arena, load
 from whisker_protocol import LIMITS, SENSOR_ERRORS
 
 from .scenes import MECHANICS, START_CLEARANCE_M, make_scene, simulated
@@ -49,11 +49,12 @@ def flat_scene(folder: str | None, seed: int, mechanics: str = MECHANICS[0]) -> 
 
 
 def _start(scene: Scene, folder: str) -> tuple[float, float, float]:
-    """The prior's mean if the robot fits there, else the free place nearest to the arena's middle."""
+    """In the arena's frame: the prior's mean if the robot fits there, else the free place nearest to the arena's middle."""
     free = scene.arena.is_free
     radius = scene.robot.body_radius_m
-    if scene.prior and scene.prior.mean and free(scene.prior.mean[0], scene.prior.mean[1], radius):
-        return scene.prior.mean
+    mean = in_arena(scene.prior or Prior("uniform"), scene.origin).mean
+    if mean and free(mean[0], mean[1], radius):
+        return mean
     width, height = scene.arena.size_m
     places = [(x * width / 50, y * height / 50) for x in range(51) for y in range(51)]
     places.sort(key=lambda p: (p[0] - width / 2) ** 2 + (p[1] - height / 2) ** 2)

@@ -52,6 +52,20 @@ static void test_good_scene(void **state)
     assert_near(scene.start.theta, 0.1, 0);
 }
 
+static void test_poses_are_told_on_the_map(void **state)
+{
+    (void)state;
+    struct sim_pose pose = {0.5, 0.25, 3.0};
+    assert_int_equal(parse(GOOD), 0);
+    struct sim_pose same = sim_scene_on_map(&scene, pose);
+    assert_memory_equal(&same, &pose, sizeof pose); /* without an origin the map is the arena */
+    assert_int_equal(parse(GOOD "origin -10 -3 1.5707963267948966\n"), 0);
+    struct sim_pose told = sim_scene_on_map(&scene, pose);
+    assert_near(told.x, -10.25, 1e-12);
+    assert_near(told.y, -2.5, 1e-12);
+    assert_near(told.theta, 3.0 - 1.5 * 3.14159265358979324, 1e-12);
+}
+
 static void test_mechanics_and_batch(void **state)
 {
     (void)state;
@@ -186,6 +200,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_good_scene),
+        cmocka_unit_test(test_poses_are_told_on_the_map),
         cmocka_unit_test(test_mechanics_and_batch),
         cmocka_unit_test(test_faces_may_have_textures),
         cmocka_unit_test(test_blanks_do_not_matter),

@@ -6,7 +6,6 @@ import sys
 
 from ..nav import localise
 from ..nav.localise import SettingError
-from ..occupancy import from_map
 from ..scene import PRIOR, SceneError, load
 
 EXAMPLE = "whisker localise examples/scene --filter grid --set grid.cell_m=0.1 --out est.csv --json"
@@ -48,14 +47,12 @@ def run(arguments: argparse.Namespace) -> int:
     for warning in scene.warnings():
         print(f"whisker: warning: {warning}", file=sys.stderr)
     observations = localise.read_observations(localise.observations_path(arguments.scene), scene)
-    if observations.truth is not None:
-        observations.truth = from_map(observations.truth, scene.origin)
     settings, regions = _settings(arguments.set), localise.REGION_ROWS
     result = localise.run(arguments.filter, scene, observations, settings, arguments.seed, regions)
     for warning in localise.warnings(result):
         print(f"whisker: warning: {warning}", file=sys.stderr)
     if arguments.out:
-        localise.write_estimates(arguments.out, result, observations, scene.origin)
+        localise.write_estimates(arguments.out, result, observations)
     summary = localise.summary(result, observations.truth)
     print(json.dumps(summary) if arguments.json else "\n".join(f"{key}: {value}" for key, value in summary.items()))
     return 0

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from ..errors import UserError
 from ..native import as_doubles, doubles, ffi, lib, octets, pointer
 from ..observation import NORMAL, Quantity, Row
-from ..scene import Prior, Scene
+from ..occupancy import from_map, spread_on_map, to_map
+from ..scene import Prior, Scene, in_arena
 from ..sensor_tables import SensorTable
 from .observations import Observations
 
@@ -117,7 +118,8 @@ class Sensor:
 
 
 class Filter:
-    """One filter on one scene. It takes rows as the pilot makes them, or their cells by column: None is an empty cell."""
+    """One filter on one scene. It takes rows as the pilot makes them, or their cells by column: None is an empty cell.
+    What it is given and what it answers is on the map; host/nav alone has it in the arena's frame."""
 
     def __init__(
         self,
@@ -197,12 +199,14 @@ class Filter:
         out = pointer(ESTIMATES, ESTIMATE, table, "table", (count,))
         lib.nav_replay(self._filter, packed, first, count, out, doubles(step_us, "step_us", (count,)))
         del keep  # until here
+        table["pose"] = to_map(table["pose"], self.scene.origin)
+        table["covariance"] = spread_on_map(table["covariance"], self.scene.origin)
         return table, step_us
 
     def set_prior(self, prior: Prior) -> None:
         """Begin again from this belief, while running. ValueError when it is none for this arena."""
         given = ffi.new("struct nav_prior *")
-        _fill_prior(given, prior)
+        _fill_prior(given, in_arena(prior, self.scene.origin))
         if (fault := lib.nav_filter_reset(self._filter, given)) != ffi.NULL:
             raise ValueError(f"prior: {ffi.string(fault).decode()}; give another one")
 
@@ -217,6 +221,7 @@ class Filter:
             out = np.zeros(self._components_room, COMPONENT)
             count = lib.nav_filter_components(self._filter, _components(out), len(out))
             if count <= len(out):
+                out["pose"] = to_map(out["pose"], self.scene.origin)
                 return out[:count]
             self._components_room = count + count // 4
 
@@ -352,10 +357,12 @@ def problem_of(
         "sensors": len(own),
         "sensor": own,
     }
-    prior = scene.prior or Prior("uniform")
+    prior = in_arena(scene.prior or Prior("uniform"), scene.origin)
     if components is not None:
+        components = components.copy()
+        components["pose"] = from_map(components["pose"], scene.origin)
         problem.prior.component, problem.prior.components = _components(components), len(components)
-    if components is None:
+    else:
         _fill_prior(ffi.addressof(problem.prior), prior)
     lib.nav_settings_default(ffi.addressof(problem.settings))
     for key, value in settings.items():

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from ..observation import ODOMETRY, TRUTH
-from ..occupancy import NOWHERE, Pose, to_map
 from ..scene import Scene
 from ..tables import unwritable
 from .filters import ESTIMATE, Estimate, Filter, SettingError, default_filter, filter_names, settings_list, to_estimate
@@ -146,10 +145,9 @@ def warnings(result: Run) -> list[str]:
     return out
 
 
-def write_estimates(path: str | Path, result: Run, observations: Observations, origin: Pose = NOWHERE) -> None:
-    """est.csv: one row per input row, in the same order; poses in the frame in which the scene's has this origin."""
-    poses = result.poses if origin == NOWHERE else to_map(result.poses, origin)
-    answers = zip(observations.t_text, poses.tolist(), result.table["confidence"].tolist(), strict=True)
+def write_estimates(path: str | Path, result: Run, observations: Observations) -> None:
+    """est.csv: one row per input row, in the same order."""
+    answers = zip(observations.t_text, result.poses.tolist(), result.table["confidence"].tolist(), strict=True)
     lines = [f"{t_s},{x:.6f},{y:.6f},{theta:.6f},{share:.6f}" for t_s, (x, y, theta), share in answers]
     try:
         Path(path).write_text("\n".join([ESTIMATE_HEADER, *lines]) + "\n")

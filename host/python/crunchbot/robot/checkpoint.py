@@ -44,8 +44,8 @@ class Checkpoint:
 
 
 def identity(scene: Scene) -> str:
-    """A hash of what a belief is about: arena and robot. Priors may differ."""
-    return sha256(repr((scene.arena, scene.robot)).encode()).hexdigest()
+    """A hash of what a belief is about: arena, robot and map frame. Priors may differ."""
+    return sha256(repr((scene.arena, scene.robot, scene.origin)).encode()).hexdigest()
 
 
 def encode(reported: Checkpoint) -> bytes:

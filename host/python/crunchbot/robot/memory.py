@@ -12,6 +12,7 @@ import numpy as np
 
 from ..nav import filters
 from ..nav.filters import COMPONENT
+from ..occupancy import from_map
 from ..pilot.states import EXPLORE_M_S, TURN_RAD_S
 from ..scene import Scene
 from . import checkpoint
@@ -66,7 +67,7 @@ class Memory:
 
     def _inside(self, components: np.ndarray) -> np.ndarray:
         """Those within the arena, of widths that can be: all that a filter begins from."""
-        x, y = components["pose"][:, 0], components["pose"][:, 1]
+        x, y, _ = from_map(components["pose"], self._scene.origin).T
         size_x, size_y = self._scene.arena.size_m
         kept = components[(x >= 0.0) & (x <= size_x) & (y >= 0.0) & (y <= size_y) & (components["mass"] > 0.0)]
         for name in ("sigma_m", "sigma_rad"):

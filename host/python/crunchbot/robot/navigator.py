@@ -127,9 +127,9 @@ class Navigator:
             if not one.over:
                 self._reported_error = ""
                 try:
-                    self._reported = initial_pose.prior_of(one.message, self._scene.arena)
+                    self._reported = initial_pose.prior_of(one.message, self._scene)
                 except InitialPoseError as error:
-                    self._reported_error = str(error)
+                    self._reported_error = f"{initial_pose.TOPIC}: {error}"
         self._begin_from_reported()
 
     def _begin_from_reported(self) -> None:

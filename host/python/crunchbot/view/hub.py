@@ -4,7 +4,8 @@ import asyncio
 import time
 
 from ..fields import Fields
-from ..scene import LARGEST_M, Scene
+from ..robot.network import initial_pose
+from ..scene import FARTHEST_M, Scene
 from .rings import find_rings
 from .robot import RobotModel
 from .robot_source import SPEED_LEAST, SPEED_MOST, NoRobot
@@ -79,12 +80,11 @@ class Hub:
         if not self.may_set_pose:
             raise RequestError("set_pose: not allowed here; start whisker-view with --robot and --allow-pose")
         try:
-            pose = tuple(Fields(request).number(name, -LARGEST_M, LARGEST_M) for name in ("x", "y", "theta"))
+            pose = tuple(Fields(request).number(name, -FARTHEST_M, FARTHEST_M) for name in ("x", "y", "theta"))
+            if self.robot.scene:
+                initial_pose.prior_of(initial_pose.message_of(pose), self.robot.scene)
         except ValueError as error:
             raise RequestError(f"set_pose: {error}") from None
-        arena = self.robot.scene and self.robot.scene.arena
-        if arena and not (0.0 <= pose[0] <= arena.size_m[0] and 0.0 <= pose[1] <= arena.size_m[1]):
-            raise RequestError("set_pose: outside the arena; point at a place inside")
         self.source.set_pose(pose)
 
     def play(self, request: dict) -> None:

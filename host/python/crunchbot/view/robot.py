@@ -17,7 +17,7 @@ from ..observation import NOT_READ, VALUE, Column, Quantity, parse
 from ..robot.network.messages import CORNER, FACE, HEALTH, SHAFT, TIP, End
 from ..robot.network.ros import Pose
 from ..robot.network.rows import between, compose
-from ..scene import LARGEST_M, Scene
+from ..scene import FARTHEST_M, Scene
 from .maps import map_parts
 from .surfaces import Surfaces
 
@@ -64,9 +64,9 @@ def _sorted(cells: list[tuple[Column, int, float]]) -> tuple[list[dict], list[di
 
 
 def placed(pose: Any) -> dict | None:
-    """x, y, theta of a Pose; None: it is of no place that an arena can have."""
+    """x, y, theta of a Pose; None: it is of no place that a map can have."""
     place = pose.xytheta
-    return dict(zip(("x", "y", "theta"), map(real, place), strict=True)) if max(map(abs, place)) <= LARGEST_M else None
+    return dict(zip(("x", "y", "theta"), map(real, place), strict=True)) if max(map(abs, place)) <= FARTHEST_M else None
 
 
 class Path:
@@ -244,7 +244,7 @@ class RobotModel:
             del self.contacts[next(iter(self.contacts))]
 
     def _place(self, whisker: str, radius_m: float) -> tuple[float | None, float | None]:
-        """Where in the arena a contact so far out on a whisker is, if the robot is where it is estimated now."""
+        """Where on the map a contact so far out on a whisker is, if the robot is where it is estimated now."""
         named = [w for w in self.scene.robot.of_role("object") if w.name == whisker] if self.scene else []
         if not named or self.pose is None:
             return None, None

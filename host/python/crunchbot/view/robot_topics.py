@@ -5,6 +5,7 @@ import struct
 import time
 from dataclasses import asdict, replace
 
+from ..occupancy import NOWHERE
 from .hub import Hub
 from .robot import RobotModel
 
@@ -26,9 +27,10 @@ class SceneFeed:
             return None
         self._reported = True
         scene = self._model.scene
-        reported = {"arena": None, "robot": None, "text": "arena not known: start whisker-view with --scene SCENE"}
+        reported = {"arena": None, "origin": NOWHERE, "robot": None, "text": "arena not known: start whisker-view with --scene SCENE"}
         if scene is not None:
-            reported = {"arena": asdict(scene.arena), "robot": asdict(replace(scene.robot, sensors=())), "text": ""}
+            robot = asdict(replace(scene.robot, sensors=()))
+            reported = {"arena": asdict(scene.arena), "origin": scene.origin, "robot": robot, "text": ""}
         return json.dumps({"topic": "scene"} | reported, separators=(",", ":"))
 
     def close(self) -> None:

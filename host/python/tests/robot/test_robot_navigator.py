@@ -19,6 +19,7 @@ from crunchbot.errors import UserError
 from crunchbot.nav import localise
 from crunchbot.nav.filters import COMPONENT
 from crunchbot.observation import Row
+from crunchbot.occupancy import to_map
 from crunchbot.robot import checkpoint
 from crunchbot.robot.navigator import Navigator, Settings
 from crunchbot.robot.network import belief, health, initial_pose
@@ -477,18 +478,38 @@ def test_a_pose_that_is_reported_while_running_is_gone_on_from(made):
         initial_pose.send(robot.link, (-1.0, 0.0, 0.0))
         errors = []
         take_until(robot.inbox, lambda got: errors.extend(_errors(got)) or errors, PATIENCE_S)
-        assert errors[0] == "initial_pose: (-1, 0) is outside the arena; give a place inside"
+        told = "initial_pose: (-1, 0) is outside the arena, which is within (0, 0) and (2.5, 2.5); give a place that is free"
+        assert errors[0] == told
 
 
 def test_a_reported_pose_has_a_frame_and_a_width(made):
-    arena = made[1].arena
+    scene = replace(made[1], origin=(-10.0, -3.0, 1.0))
+    free = next((x, y, 0.5) for x in (0.8, 1.2, 1.7) for y in (0.8, 1.2, 1.7) if scene.arena.is_free(x, y, 0.1))
+    place = tuple(to_map(np.array([free]), scene.origin)[0].tolist())
 
-    def message(frame: str, sigma: float):
-        pose = m.PoseWithCovariance.planar((1.0, 2.0, 0.5), np.diag([sigma**2] * 3))
-        return m.PoseWithCovarianceStamped(m.Header.at(0, frame), pose)
+    def message(frame: str, *sigma: float, pose=place):
+        planar = m.PoseWithCovariance.planar(pose, np.diag(np.square(sigma)))
+        return m.PoseWithCovarianceStamped(m.Header.at(0, frame), planar)
 
-    assert initial_pose.prior_of(message("", 0.0), arena).sigma == (initial_pose.FINEST,) * 3
-    prior = initial_pose.prior_of(message("map", 0.3), arena)
-    assert prior.mean == pytest.approx((1.0, 2.0, 0.5)) and prior.sigma == pytest.approx((0.3,) * 3)
+    prior = initial_pose.prior_of(message("map", 0.3, 0.3, 0.3), scene)
+    assert prior.mean == pytest.approx(place) and prior.sigma == pytest.approx((0.3,) * 3)
+    assert initial_pose.prior_of(message("", 1e-9, 1e-9, 1e-9), scene).sigma == (initial_pose.FINEST,) * 3
     with pytest.raises(initial_pose.InitialPoseError, match="frame 'odom'; give a pose in frame 'map'"):
-        initial_pose.prior_of(message("odom", 0.3), arena)
+        initial_pose.prior_of(message("odom", 0.3, 0.3, 0.3), scene)
+    assert initial_pose.prior_of(message("", 0.0, 0.0, 0.0), scene).sigma == initial_pose.SIGMA
+    assert initial_pose.prior_of(message("", 0.2, 0.1, 0.0), scene).sigma == pytest.approx((0.2, 0.1, np.pi / 12))
+    upside_down = message("map", 0.3, 0.3, 0.3)
+    for turn in ((0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)):
+        upside_down.pose.pose.orientation = m.Quaternion(*turn)
+        with pytest.raises(initial_pose.InitialPoseError, match=r"orientation \([01], 0, 0, 0\) has no heading; give z = "):
+            initial_pose.prior_of(upside_down, scene)
+    x0, y0, x1, y1 = scene.arena.obstacles[0]
+    wall = to_map(np.array([((x0 + x1) / 2, (y0 + y1) / 2, 0.0)]), scene.origin)[0].round(2).tolist()
+    for pose, fault in ((wall, "in an obstacle"), ((1.0, 2.0, 0.5), "outside the arena")):
+        with pytest.raises(initial_pose.InitialPoseError, match=rf"\({pose[0]:g}, {pose[1]:g}\) is {fault}"):
+            initial_pose.prior_of(message("map", 0.3, 0.3, 0.3, pose=pose), scene)
+    tied = message("map", 0.3, 0.3, 0.3)
+    tied.pose.covariance[[1, 6]], tied.pose.covariance[[5, 30]] = 0.05, -0.08
+    sigma = initial_pose.prior_of(tied, scene).sigma
+    left = np.diag(np.square(sigma)) - tied.pose.planar_covariance
+    assert np.linalg.eigvalsh(left).min() > -1e-9 and max(sigma) < 0.6, "in no direction narrower than given"

@@ -48,7 +48,7 @@ from crunchbot.robot.network.messages import (
     Time,
     encode,
 )
-from crunchbot.scene import LARGEST_M, Scene
+from crunchbot.scene import FARTHEST_M, Scene
 from crunchbot.sensor_tables import SensorTable
 from crunchbot.view.command import ROBOT
 from crunchbot.view.hub import Hub
@@ -200,7 +200,7 @@ def test_a_process_that_fell_silent_is_reported_from_one_that_ended_and_one_neve
 
 def test_a_pose_that_no_arena_can_have_is_not_known():
     model = reported_model(5)
-    model.take("truth", PoseStamped(Header.at(6 * ROW_NS), Pose.planar(2 * LARGEST_M, 0.0, 0.0)))
+    model.take("truth", PoseStamped(Header.at(6 * ROW_NS), Pose.planar(2 * FARTHEST_M, 0.0, 0.0)))
     assert model.truth is None and len(model.true_path.points) == 5
 
 
@@ -281,8 +281,8 @@ def test_a_page_is_reported_of_unknown_ground_and_not_of_tables():
     "may, pose, said",
     [
         (True, {"x": 0.3, "y": 2, "theta": -1.5}, ""),
-        (True, {"x": 2.6, "y": 2, "theta": 0}, "set_pose: outside the arena"),
-        (True, {"x": "1", "y": 2, "theta": 0}, "set_pose: field 'x' must be a number from -1000 to 1000, not '1'"),
+        (True, {"x": 2.6, "y": 2, "theta": 0}, "set_pose: (2.6, 2) is outside the arena"),
+        (True, {"x": "1", "y": 2, "theta": 0}, "set_pose: field 'x' must be a number from -3000 to 3000, not '1'"),
         (True, {"x": True, "y": 2, "theta": 0}, "set_pose: field 'x' must be a number"),
         (True, {"x": 1, "y": 2}, "set_pose: field 'theta' is missing"),
         (False, {"x": 0.3, "y": 2, "theta": -1.5}, "set_pose: not allowed here"),
@@ -352,8 +352,8 @@ def test_over_a_real_network_a_page_sees_what_a_pilot_sends():
                     hub.robot.take(topic, message)
         assert hub.robot.rows["unseen"] == 0 and hub.robot.row["tips"]
         assert source.refused()["count"] == 0
-        source.set_pose((0.5, 1.5, 2.0))
-        assert initial_pose.prior_of(reported.take(PATIENCE_S)[0].message, ARENA).mean == pytest.approx((0.5, 1.5, 2.0))
+        source.set_pose((0.3, 1.5, 2.0))
+        assert initial_pose.prior_of(reported.take(PATIENCE_S)[0].message, SCENE).mean == pytest.approx((0.3, 1.5, 2.0))
 
     with Link("pilot", ROBOT, listen=[endpoint]) as pilot:
         reported = pilot.subscribe(initial_pose.TOPIC)

@@ -1,16 +1,25 @@
-"""Where a robot is, given by a person while it runs: messages of topic `initial_pose`, as those of ROS's /initialpose."""
+"""Where a robot is, given by a person while it runs: messages of topic `initial_pose`, as those of ROS's /initialpose.
+
+`prior_of` judges them, whichever door they came by. What a message leaves open is not certain: see SIGMA.
+"""
+
+from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...scene import Arena, Prior
-from .link import Link
+from ...scene import Prior, Scene, independent
 from .messages import Header, PoseWithCovariance, PoseWithCovarianceStamped
 from .ros import MAP_FRAME
 
+if TYPE_CHECKING:
+    from .link import Link
+
 TOPIC = "initial_pose"
-SIGMA = (0.1, 0.1, 0.2)  # m, m, rad: of a pose that is pointed at
+# m, m, rad where no variance is given: what RViz sends with a pose that is pointed at, and AMCL begins with.
+SIGMA = (0.5, 0.5, math.pi / 12)
 FINEST = 1e-3  # m and rad: nobody knows a pose better
 
 
@@ -18,11 +27,19 @@ class InitialPoseError(ValueError):
     """A pose that a navigator cannot begin from; one line: what, remedy."""
 
 
+def message_of(
+    pose: tuple[float, float, float], sigma: tuple[float, float, float] = SIGMA
+) -> PoseWithCovarianceStamped:
+    """x, y in m, heading in rad, on the map; standard deviations alike."""
+    return PoseWithCovarianceStamped(
+        Header.at(0, MAP_FRAME), PoseWithCovariance.planar(pose, np.diag(np.square(sigma)))
+    )
+
+
 def send(link: Link, pose: tuple[float, float, float], sigma: tuple[float, float, float] = SIGMA) -> None:
-    """Tell the navigator of this link's robot that it is at this pose now: x, y in m, heading in rad, in the arena's
-    frame; standard deviations alike. One stream for each pose, so that the next may come from another process."""
-    message = PoseWithCovariance.planar(pose, np.diag(np.square(sigma)))
-    send_message(link, PoseWithCovarianceStamped(Header.at(0, MAP_FRAME), message))
+    """Tell the navigator of this link's robot that it is at this pose now, as `message_of` has it. One stream for each
+    pose, so that the next may come from another process."""
+    send_message(link, message_of(pose, sigma))
 
 
 def send_message(link: Link, message: PoseWithCovarianceStamped) -> None:
@@ -32,13 +49,18 @@ def send_message(link: Link, message: PoseWithCovarianceStamped) -> None:
     stream.end(0, "reported")
 
 
-def prior_of(message: PoseWithCovarianceStamped, arena: Arena) -> Prior:
-    """The belief that such a message asks for; InitialPoseError when it is of another frame, or outside the arena."""
+def prior_of(message: PoseWithCovarianceStamped, scene: Scene) -> Prior:
+    """The belief that such a message asks for, on the map; InitialPoseError when it is of another frame, has no heading,
+    or is where no robot can be. A variance of 0 is one that was not given; what x, y and heading have in common widens it."""
     if message.header.frame_id not in ("", MAP_FRAME):
-        raise InitialPoseError(f"{TOPIC}: frame '{message.header.frame_id}'; give a pose in frame '{MAP_FRAME}'")
-    x, y, _ = message.pose.pose.xytheta
-    if not (0.0 <= x <= arena.size_m[0] and 0.0 <= y <= arena.size_m[1]):
-        raise InitialPoseError(f"{TOPIC}: ({x:.3g}, {y:.3g}) is outside the arena; give a place inside")
-    variances = np.diag(message.pose.planar_covariance)
-    sigma = tuple(max(FINEST, math.sqrt(variance)) for variance in variances.tolist())
-    return Prior("gaussian", tuple(map(float, message.pose.pose.xytheta)), sigma)
+        raise InitialPoseError(f"frame '{message.header.frame_id}'; give a pose in frame '{MAP_FRAME}'")
+    turn = message.pose.pose.orientation
+    if not turn.z**2 + turn.w**2 > turn.x**2 + turn.y**2:
+        told = ", ".join(f"{value:.3g}" for value in (turn.x, turn.y, turn.z, turn.w))
+        raise InitialPoseError(f"orientation ({told}) has no heading; give z = sin(heading / 2), w = cos(heading / 2)")
+    pose = tuple(map(float, message.pose.pose.xytheta))
+    if fault := scene.fault_at(pose):
+        raise InitialPoseError(f"({pose[0]:g}, {pose[1]:g}) is {fault}; give a place that is free")
+    given = independent(message.pose.planar_covariance)
+    sigma = (max(FINEST, width) if width > 0.0 else open_ for width, open_ in zip(given, SIGMA, strict=True))
+    return Prior("gaussian", pose, tuple(sigma))

@@ -85,7 +85,9 @@ class Outlet:
         try:
             cdr = bytearray(read())
             cdr[STAMP] = bytes(8)  # it is of a clock that the navigator does not know; the pose is of now
-            initial_pose.send_message(link, decode(PoseWithCovarianceStamped, bytes(cdr), POSE_TOPIC))
+            message = decode(PoseWithCovarianceStamped, bytes(cdr), POSE_TOPIC)
+            initial_pose.prior_of(message, self._view.scene)
+            initial_pose.send_message(link, message)
             self.poses_set += 1
         except (MessageError, Malformed, ValueError) as error:
             self.poses_refused += 1

@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from ...scene import Arena, Robot
+from ...occupancy import Pose as Place
+from ...occupancy import from_map, to_map
+from ...scene import Robot, Scene
 from ..network.ros import Header, MapMetaData, OccupancyGrid, Point, Pose, Vector3
 from .types import make
 
@@ -31,8 +33,9 @@ def pose(x: float, y: float, theta: float = 0.0, z: float = 0.0) -> Pose:
     return made
 
 
-def occupancy(arena: Arena, header: Header) -> OccupancyGrid:
+def occupancy(scene: Scene, header: Header) -> OccupancyGrid:
     """Of boxes, of ground that was never mapped, and of the walls as a border of one cell."""
+    arena = scene.arena
     cell = max(MAP_CELL_M, max(arena.size_m) / CELLS_MOST)
     columns, rows = (math.ceil(size / cell - 1e-9) for size in arena.size_m)
     cells = np.full((rows + 2, columns + 2), SOLID, np.int8)
@@ -41,22 +44,25 @@ def occupancy(arena: Arena, header: Header) -> OccupancyGrid:
         for x0, y0, x1, y1 in boxes:
             across = slice(1 + math.floor(x0 / cell + 1e-9), 1 + math.ceil(x1 / cell - 1e-9))
             cells[1 + math.floor(y0 / cell + 1e-9) : 1 + math.ceil(y1 / cell - 1e-9), across] = value
-    return _grid(cells, cell, (-cell, -cell), header)
+    corner = to_map(np.array([(-cell, -cell, 0.0)]), scene.origin)[0].tolist()
+    return _grid(cells, cell, corner, header)
 
 
-def belief(message: Any, arena: Arena, header: Header) -> OccupancyGrid:
+def belief(message: Any, scene: Scene, header: Header) -> OccupancyGrid:
     """Of a belief's mass: 100 in the cell that holds most."""
+    arena = scene.arena
+    x, y, _ = from_map(np.column_stack([message.x, message.y, message.theta]), scene.origin).T
     cell = max(BELIEF_CELL_M, max(arena.size_m) / CELLS_MOST)
     columns, rows = (max(1, math.ceil(size / cell - 1e-9)) for size in arena.size_m)
     mass = np.zeros((rows, columns))
-    column = np.clip((np.asarray(message.x) / cell).astype(int), 0, columns - 1)
-    row = np.clip((np.asarray(message.y) / cell).astype(int), 0, rows - 1)
+    column = np.clip((x / cell).astype(int), 0, columns - 1)
+    row = np.clip((y / cell).astype(int), 0, rows - 1)
     np.add.at(mass, (row, column), message.weight)
     share = mass / mass.max() if mass.max() > 0.0 else mass
-    return _grid(np.rint(100 * share).astype(np.int8), cell, (0.0, 0.0), header)
+    return _grid(np.rint(100 * share).astype(np.int8), cell, scene.origin, header)
 
 
-def _grid(cells: np.ndarray, cell_m: float, origin: tuple[float, float], header: Header) -> OccupancyGrid:
+def _grid(cells: np.ndarray, cell_m: float, origin: Place, header: Header) -> OccupancyGrid:
     rows, columns = cells.shape
     info = MapMetaData(resolution=cell_m, width=columns, height=rows, origin=pose(*origin))
     return OccupancyGrid(header, info, cells.ravel())

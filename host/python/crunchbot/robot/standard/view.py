@@ -1,6 +1,6 @@
 """Messages of the robot's processes in, standard messages of ROS 2 out, by topic.
 
-Frames are those of REP 105: map (the arena's), odom, base_link. map to odom is what localisation corrects of the
+Frames are those of REP 105: map (the scene's), odom, base_link. map to odom is what localisation corrects of the
 odometry. Stamps are the wall's, as in a bag.
 """
 
@@ -68,7 +68,7 @@ class StandardView:
     """`take` every message of a robot; yields what follows from it. `first`: what holds before any has come."""
 
     def __init__(self, scene: Scene, wall_ns: int):
-        self._scene, self._clock = scene, LogClock(wall_ns)
+        self.scene, self._clock = scene, LogClock(wall_ns)
         self._odometry: deque = deque(maxlen=ODOMETRIES_MOST)  # ns, x, y, heading that does not wrap
         self._path: deque = deque(maxlen=PATH_MOST)
         self._rows, self._filter = 0, ""
@@ -81,7 +81,7 @@ class StandardView:
 
     def first(self) -> Iterator[Standard]:
         now = self._clock.latest
-        yield Standard("/map", now, shapes.occupancy(self._scene.arena, Header.at(now, MAP_FRAME)))
+        yield Standard("/map", now, shapes.occupancy(self.scene, Header.at(now, MAP_FRAME)))
 
     def take(self, topic: str, message: Any) -> Iterator[Standard]:
         """A message of a topic of network.messages.TOPICS, or of health."""
@@ -98,10 +98,10 @@ class StandardView:
     def _take_observation(self, row, _: int, wall_ns: int) -> Iterator[Standard]:
         self._touching = {}
         for name, cell, value in zip(row.names, row.cells.tolist(), row.values.tolist(), strict=True):
-            column = self._scene.layout.get(name)
+            column = self.scene.layout.get(name)
             if column is not None and column.quantity is Quantity.DISTANCE and cell == VALUE:
                 self._touching[column.whisker] = value / 1000.0
-        markers = shapes.robot_markers(self._scene.robot, self._touching, Header.at(wall_ns, BASE_FRAME))
+        markers = shapes.robot_markers(self.scene.robot, self._touching, Header.at(wall_ns, BASE_FRAME))
         yield Standard("/robot", wall_ns, markers)
 
     def _take_odometry(self, odometry, stamp_ns: int, wall_ns: int) -> Iterator[Standard]:
@@ -141,7 +141,7 @@ class StandardView:
     def _take_belief(self, reported, _: int, wall_ns: int) -> Iterator[Standard]:
         if reported.filter != self._filter:
             return
-        grid = shapes.belief(reported, self._scene.arena, Header.at(wall_ns, MAP_FRAME))
+        grid = shapes.belief(reported, self.scene, Header.at(wall_ns, MAP_FRAME))
         yield Standard("/belief", wall_ns, grid)
 
     def _take_map(self, grid, _: int, wall_ns: int) -> Iterator[Standard]:

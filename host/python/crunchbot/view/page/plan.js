@@ -24,7 +24,7 @@ class Plan {
 
   show(scene) {
     this.scene = scene;
-    if (scene.arena && !this.map) this.bounds = [0, 0, ...scene.arena.size_m];
+    if (scene.arena && !this.map) this.bounds = arenaBounds(scene);
     this.layOut();
   }
 
@@ -32,7 +32,7 @@ class Plan {
 
   /* A map that grows, in place of the arena; null: the arena again. */
   showMap(map) {
-    const wanted = map ? mapBounds(map) : [0, 0, ...(this.scene?.arena?.size_m ?? [1, 1])];
+    const wanted = map ? mapBounds(map) : this.scene?.arena ? arenaBounds(this.scene) : [0, 0, 1, 1];
     const fits = Boolean(map) === Boolean(this.map) && wanted.every((value, n) => value === this.bounds[n]);
     this.map = map;
     this.bounds = wanted;
@@ -95,7 +95,13 @@ class Plan {
     pen.restore();
   }
 
+  /* In the arena's frame, which has a place on the map. */
   drawArena(pen, arena) {
+    const [left, foot, turn] = this.scene.origin;
+    pen.save();
+    pen.translate(this.x(left), this.y(foot));
+    pen.rotate(-turn);
+    pen.translate(-this.x(0), -this.y(0));
     arena.floor.forEach((row, fromTop) => [...row].forEach((letter, column) => {
       const y = (arena.floor.length - 1 - fromTop) * arena.tile_m;
       this.drawTile(pen, arena, letter, column * arena.tile_m, y);
@@ -103,6 +109,9 @@ class Plan {
     const hatch = this.pattern(2, '--soft', 0.7);
     for (const box of arena.unknown) this.drawUnknown(pen, box);
     for (const box of arena.obstacles) this.drawObstacle(pen, box, hatch);
+    pen.strokeStyle = this.css('--ink');
+    pen.strokeRect(this.x(0), this.y(arena.size_m[1]), arena.size_m[0] * this.scale, arena.size_m[1] * this.scale);
+    pen.restore();
   }
 
   /* The last row and column may be cut off by the walls. */
@@ -159,8 +168,9 @@ class Plan {
     for (const x of ticks(x0, x1)) this.text(pen, axis(x), this.x(x), this.bottom + 11 * this.ratio, '--soft', 11, 'center');
     for (const y of ticks(y0, y1)) this.text(pen, axis(y), this.left - 5 * this.ratio, this.y(y), '--soft', 11, 'right');
     pen.strokeStyle = this.css('--ink');
-    pen.lineWidth = (this.arena ? 2 : 1) * this.ratio;
-    if (!this.arena) pen.setLineDash([2 * this.ratio, 4 * this.ratio]); // what is shown, not walls
+    const walls = this.arena && !this.scene.origin[2];
+    pen.lineWidth = (walls ? 2 : 1) * this.ratio;
+    if (!walls) pen.setLineDash([2 * this.ratio, 4 * this.ratio]); // what is shown, not walls
     pen.strokeRect(this.left, this.y(y1), (x1 - x0) * this.scale, (y1 - y0) * this.scale);
     pen.setLineDash([]);
   }
@@ -182,6 +192,13 @@ class Plan {
     pen.fillStyle = this.css(colour);
     pen.fillText(words, x, y);
   }
+}
+
+/* What an arena takes of its map, metres. */
+function arenaBounds({ arena, origin: [x, y, turn] }) {
+  const [[wide, high], c, s] = [arena.size_m, Math.cos(turn), Math.sin(turn)];
+  const corners = [[0, 0], [wide, 0], [0, high], [wide, high]].map(([a, b]) => [x + c * a - s * b, y + s * a + c * b]);
+  return [Math.min, Math.max].flatMap((pick) => [0, 1].map((axis) => pick(...corners.map((corner) => corner[axis]))));
 }
 
 /* A number with so many places and a proper minus; what is no number is said to be not known. */

@@ -29,7 +29,7 @@ class PoseTool {
     this.redraw();
   }
 
-  /* Metres of the arena under a pointer. */
+  /* Metres of the map under a pointer. */
   at(event) {
     const { plan } = this, box = plan.live.getBoundingClientRect();
     const [x, y] = [(event.clientX - box.left) * plan.ratio, (event.clientY - box.top) * plan.ratio];

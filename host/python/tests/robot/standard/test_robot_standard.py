@@ -85,7 +85,7 @@ def test_stamps_are_the_walls():
 
 
 def test_the_map_has_boxes_unknown_ground_and_walls():
-    grid = shapes.occupancy(ARENA, types.make("std_msgs/Header", frame_id="map"))
+    grid = shapes.occupancy(SCENE, types.make("std_msgs/Header", frame_id="map"))
     cells = np.array(grid.data).reshape(grid.info.height, grid.info.width)
 
     def at(x: float, y: float) -> int:
@@ -100,7 +100,7 @@ def test_the_map_has_boxes_unknown_ground_and_walls():
 def test_the_belief_is_a_grid_of_its_mass():
     columns = [np.array(values) for values in ((0.11, 0.12, 1.91), (0.11, 0.12, 0.91), (0, 0, 0), (0.3, 0.3, 0.3))]
     belief = m.Belief(m.Header(), "adaptive", 1, 3, 0.9, *columns, np.zeros(3), np.zeros(3))
-    grid = shapes.belief(belief, ARENA, types.make("std_msgs/Header"))
+    grid = shapes.belief(belief, SCENE, types.make("std_msgs/Header"))
     cells = np.array(grid.data).reshape(grid.info.height, grid.info.width)
     assert cells[2, 2] == 100 and cells[18, 38] == 50 and cells.sum() == 150
 
