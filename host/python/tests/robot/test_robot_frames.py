@@ -125,6 +125,7 @@ def test_the_navigator_answers_on_the_map_and_takes_a_pose_there(room, mapped, c
         answer = next(r.message for r in got if r.topic == "localisation" and r.message.prior == "given")
         assert np.hypot(*np.subtract(answer.pose.pose.xytheta, room.truth[-1])[:2]) < 0.1
     assert np.allclose(np.genfromtxt(tmp_path / f"est_{FILTER}.csv", delimiter=",", skip_header=1)[:ROWS, 1:4], by_file)
+    assert (tmp_path / "kept").stat().st_size > 500, "what was believed was in the arena, and was kept"
     again = localise.Filter(FILTER, scene, components=scene_components(scene, by_file[-1]))
     assert np.hypot(*(np.array(again.step(rows[0]).pose) - by_file[-1])[:2]) < 0.1, "a kept belief is on the map too"
 
