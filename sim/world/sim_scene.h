@@ -72,7 +72,7 @@ struct sim_scene {
     size_t whiskers;
     struct sim_whisker whisker[SIM_WHISKERS_MAX];
     struct sim_pose start;
-    struct sim_pose origin; /* of the arena's frame on the map, in which poses are told */
+    struct sim_pose origin; /* of the arena's frame on the map, in which poses are reported */
     enum sim_mechanics mechanics;
     uint32_t batch;
 };

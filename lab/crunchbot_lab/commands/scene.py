@@ -34,9 +34,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     example = "whisker scene map examples/scene examples/home.yaml --out scenes/mapped"
     text = "put an occupancy map into a scene folder, for all commands that take one"
     p = add_action(actions, "map", text, example, with_map)
-    p.add_argument(
-        "scene", help="scene folder; without arena.toml the map is the arena, and its origin the arena's"
-    )
+    p.add_argument("scene", help="scene folder; without arena.toml the map is the arena, and its origin the arena's")
     p.add_argument("map", metavar="MAP.YAML", help="a ROS map server's YAML file")
     p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
 

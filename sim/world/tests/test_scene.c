@@ -60,10 +60,10 @@ static void test_poses_are_told_on_the_map(void **state)
     struct sim_pose same = sim_scene_on_map(&scene, pose);
     assert_memory_equal(&same, &pose, sizeof pose); /* without an origin the map is the arena */
     assert_int_equal(parse(GOOD "origin -10 -3 1.5707963267948966\n"), 0);
-    struct sim_pose told = sim_scene_on_map(&scene, pose);
-    assert_near(told.x, -10.25, 1e-12);
-    assert_near(told.y, -2.5, 1e-12);
-    assert_near(told.theta, 3.0 - 1.5 * 3.14159265358979324, 1e-12);
+    struct sim_pose reported = sim_scene_on_map(&scene, pose);
+    assert_near(reported.x, -10.25, 1e-12);
+    assert_near(reported.y, -2.5, 1e-12);
+    assert_near(reported.theta, 3.0 - 1.5 * 3.14159265358979324, 1e-12);
 }
 
 static void test_mechanics_and_batch(void **state)

@@ -27,7 +27,12 @@ class SceneFeed:
             return None
         self._reported = True
         scene = self._model.scene
-        reported = {"arena": None, "origin": NOWHERE, "robot": None, "text": "arena not known: start whisker-view with --scene SCENE"}
+        reported = {
+            "arena": None,
+            "origin": NOWHERE,
+            "robot": None,
+            "text": "arena not known: start whisker-view with --scene SCENE",
+        }
         if scene is not None:
             robot = asdict(replace(scene.robot, sensors=()))
             reported = {"arena": asdict(scene.arena), "origin": scene.origin, "robot": robot, "text": ""}

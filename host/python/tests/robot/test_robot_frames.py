@@ -115,9 +115,9 @@ def test_the_navigator_answers_on_the_map_and_takes_a_pose_there(room, mapped, c
         got = take_until(robot.inbox, lambda got: sum(r.topic == "pose" for r in got) == ROWS, PATIENCE_S)
         by_topic = {name: [r.message for r in got if r.topic == name] for name in names}
         assert np.allclose([p.pose.pose.xytheta for p in by_topic["pose"]], by_file, atol=2e-6)
-        told = by_topic["belief"][-1]
-        centre = np.average(np.column_stack([told.x, told.y]), axis=0, weights=told.weight)
-        assert np.hypot(*(centre - by_file[told.observation_seq, :2])) < 0.1
+        reported = by_topic["belief"][-1]
+        centre = np.average(np.column_stack([reported.x, reported.y]), axis=0, weights=reported.weight)
+        assert np.hypot(*(centre - by_file[reported.observation_seq, :2])) < 0.1
         initial_pose.send(robot.link, tuple(room.truth[-1]), (0.02, 0.02, 0.02))
         while not any(r.topic == "localisation" and r.message.prior == "given" for r in got):
             robot.send([{**rows[-1], "t_s": rows[-1]["t_s"] + 0.1}])
@@ -162,8 +162,8 @@ def test_standard_messages_have_the_map_of_the_map_server(room, mapped):
     columns, rows, _ = (from_map(to_map(places, ORIGIN), (x, y, yaw)) / grid.info.resolution).astype(int).T
     assert cells[rows, columns].tolist() == [100, 0] and yaw == pytest.approx(ORIGIN[2])
     place = room.truth[5]
-    told = m.Localisation(m.Header.at(1), FILTER, m.PoseWithCovariance.planar(place, np.eye(3)), 1.0, 0)
-    list(view.take("localisation", told))
+    reported = m.Localisation(m.Header.at(1), FILTER, m.PoseWithCovariance.planar(place, np.eye(3)), 1.0, 0)
+    list(view.take("localisation", reported))
     belief = m.Belief(m.Header.at(1), FILTER, 0, 1, 1.0, *np.array([*place, 1.0, 0.01, 0.01])[:, None])
     (shown,) = [standard.message for standard in view.take("belief", belief)]
     row, column = divmod(int(np.argmax(shown.data)), shown.info.width)
@@ -178,8 +178,8 @@ def test_a_bag_keeps_the_frame(room, mapped, tmp_path):
     with TopicWriter(path, RECORD, metadata("robot", mapped)) as writer:
         bag = Bag(writer, "robot", scene)
         row = to_message(Row.of(rows[0]), 0, np.zeros(3))
-        told = {"observation": row, "truth": m.PoseStamped(row.header, m.Pose.planar(*room.truth[0]))}
-        bag.take([Received(topic, message, Envelope(0, 0, 0)) for topic, message in told.items()])
+        reported = {"observation": row, "truth": m.PoseStamped(row.header, m.Pose.planar(*room.truth[0]))}
+        bag.take([Received(topic, message, Envelope(0, 0, 0)) for topic, message in reported.items()])
         writer.finish()
     assert read_bag(path, ["truth"]).scene.origin == ORIGIN
     made, kept = scenes.read_recording(path)

@@ -478,8 +478,8 @@ def test_a_pose_that_is_reported_while_running_is_gone_on_from(made):
         initial_pose.send(robot.link, (-1.0, 0.0, 0.0))
         errors = []
         take_until(robot.inbox, lambda got: errors.extend(_errors(got)) or errors, PATIENCE_S)
-        told = "initial_pose: (-1, 0) is outside the arena, which is within (0, 0) and (2.5, 2.5); give a place that is free"
-        assert errors[0] == told
+        wanted = "initial_pose: (-1, 0) is outside the arena, which is within (0, 0) and (2.5, 2.5); give a place that is free"
+        assert errors[0] == wanted
 
 
 def test_a_reported_pose_has_a_frame_and_a_width(made):
@@ -501,7 +501,9 @@ def test_a_reported_pose_has_a_frame_and_a_width(made):
     upside_down = message("map", 0.3, 0.3, 0.3)
     for turn in ((0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)):
         upside_down.pose.pose.orientation = m.Quaternion(*turn)
-        with pytest.raises(initial_pose.InitialPoseError, match=r"orientation \([01], 0, 0, 0\) has no heading; give z = "):
+        with pytest.raises(
+            initial_pose.InitialPoseError, match=r"orientation \([01], 0, 0, 0\) has no heading; give z = "
+        ):
             initial_pose.prior_of(upside_down, scene)
     x0, y0, x1, y1 = scene.arena.obstacles[0]
     wall = to_map(np.array([((x0 + x1) / 2, (y0 + y1) / 2, 0.0)]), scene.origin)[0].round(2).tolist()

@@ -56,8 +56,10 @@ def prior_of(message: PoseWithCovarianceStamped, scene: Scene) -> Prior:
         raise InitialPoseError(f"frame '{message.header.frame_id}'; give a pose in frame '{MAP_FRAME}'")
     turn = message.pose.pose.orientation
     if not turn.z**2 + turn.w**2 > turn.x**2 + turn.y**2:
-        told = ", ".join(f"{value:.3g}" for value in (turn.x, turn.y, turn.z, turn.w))
-        raise InitialPoseError(f"orientation ({told}) has no heading; give z = sin(heading / 2), w = cos(heading / 2)")
+        reported = ", ".join(f"{value:.3g}" for value in (turn.x, turn.y, turn.z, turn.w))
+        raise InitialPoseError(
+            f"orientation ({reported}) has no heading; give z = sin(heading / 2), w = cos(heading / 2)"
+        )
     pose = tuple(map(float, message.pose.pose.xytheta))
     if fault := scene.fault_at(pose):
         raise InitialPoseError(f"({pose[0]:g}, {pose[1]:g}) is {fault}; give a place that is free")
