@@ -91,7 +91,8 @@ def folder(tmp_path_factory) -> Path:
     cells = np.zeros((10, 10), np.uint8)
     sensor = SensorTable("light", (0.0, 0.0), 0.0, 0.0, cells, 0.3, np.array([0.0, 1.0]), np.array([[1.0]]))
     prior = scene_files.Prior("gaussian", (1.0, 1.0, 0.0), (0.1, 0.1, 0.1))
-    whole = scene_files.Scene(arena, dataclasses.replace(robot, sensors=(sensor,)), prior)
+    robot = dataclasses.replace(robot, sensors=(sensor,))
+    whole = scene_files.Scene(arena, robot, prior, origin=(-1.0, 2.0, 0.5))
     rows = made.observations
     rows = dataclasses.replace(rows, own=np.zeros((len(rows), 1)), point=np.full((*rows.normal.shape[:2], 3), np.nan))
     scenes.write_scene(path, whole, rows)

@@ -52,7 +52,7 @@ static void test_good_scene(void **state)
     assert_near(scene.start.theta, 0.1, 0);
 }
 
-static void test_poses_are_told_on_the_map(void **state)
+static void test_poses_are_reported_on_the_map(void **state)
 {
     (void)state;
     struct sim_pose pose = {0.5, 0.25, 3.0};
@@ -200,7 +200,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_good_scene),
-        cmocka_unit_test(test_poses_are_told_on_the_map),
+        cmocka_unit_test(test_poses_are_reported_on_the_map),
         cmocka_unit_test(test_mechanics_and_batch),
         cmocka_unit_test(test_faces_may_have_textures),
         cmocka_unit_test(test_blanks_do_not_matter),

@@ -67,7 +67,7 @@ def test_a_program_of_ros_reads_the_robot_and_sets_its_pose(tmp_path):
 def check_map(desk: Desk) -> None:
     """It was published before the reader was there."""
     (grid,) = wait_for(desk.reader("rt/map", rosdesk.OccupancyGrid, rosdesk.KEPT).take, "no map")
-    wanted = shapes.occupancy(SCENE.arena, types.make("std_msgs/Header"))
+    wanted = shapes.occupancy(SCENE, types.make("std_msgs/Header"))
     assert grid.header.frame_id == "map" and grid.info.resolution == pytest.approx(wanted.info.resolution)
     assert (grid.info.width, grid.info.height) == (wanted.info.width, wanted.info.height)
     assert np.array_equal(grid.data, wanted.data)
