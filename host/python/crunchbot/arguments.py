@@ -4,6 +4,7 @@ The parser is argparse's and no library's: a subcommand is imported only when it
 """
 
 import argparse
+import difflib
 import math
 import pwd
 import sys
@@ -14,6 +15,7 @@ from typing import Any, NoReturn
 from .errors import UserError
 
 NO_USER = 2**32 - 1  # as a user id: nobody's
+UNKNOWN = "unrecognized arguments: "  # as argparse begins it
 RING = "whisker"  # the name whiskerd's unit gives its ring
 
 
@@ -24,11 +26,35 @@ class Parser(argparse.ArgumentParser):
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
-        self.exit(UserError.exit_code, f"{self.prog}: {message}; see '{self.prog} --help'\n")
+        words = message.removeprefix(UNKNOWN).split() if message.startswith(UNKNOWN) else []
+        hint = nearest(words[0].partition("=")[0], options_of(self)) if words else ""
+        self.exit(UserError.exit_code, f"{self.prog}: {message}{hint}; see '{self.prog} --help'\n")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """As argparse's, with the nearest choice in place of all where one is near."""
+        choices = list(map(str, action.choices or ()))
+        if choices and value not in (action.choices or ()):
+            hint = nearest(str(value), choices) or f" (choose from {', '.join(choices)})"
+            raise argparse.ArgumentError(action, f"invalid choice: {value!r}{hint}")
 
     def show_example(self, command_line: str) -> None:
         """End the help with this."""
         self.epilog = f"example:\n  {command_line}"
+
+
+def nearest(word: str, choices: list[str]) -> str:
+    """ "; did you mean ...?" where one of the choices is like the word, else nothing."""
+    found = difflib.get_close_matches(word, choices, 1)
+    return f"; did you mean {found[0]}?" if found else ""
+
+
+def options_of(parser: argparse.ArgumentParser) -> list[str]:
+    """The option words of a parser and its subcommands."""
+    found = list(parser._option_string_actions)
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            found += [word for inner in action.choices.values() for word in options_of(inner)]
+    return found
 
 
 def warn(line: str) -> None:

@@ -53,8 +53,10 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"whisker: warning: {warning}", file=sys.stderr)
     if arguments.out:
         localise.write_estimates(arguments.out, result, observations)
-    summary = localise.summary(result, observations.truth)
-    print(json.dumps(summary) if arguments.json else "\n".join(f"{key}: {value}" for key, value in summary.items()))
+    if arguments.json:
+        print(json.dumps(localise.summary(result, observations.truth)))
+    else:
+        print("\n".join(localise.spoken(result, observations.truth)))
     return 0
 
 

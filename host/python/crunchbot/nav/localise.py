@@ -28,6 +28,7 @@ __all__ = [
     "read_observations",
     "run",
     "settings_list",
+    "spoken",
     "summary",
     "warnings",
     "write_estimates",
@@ -129,6 +130,30 @@ def summary(result: Run, truth: np.ndarray | None) -> dict:
         covered, areas = result.levels[judged] <= 0.9, result.areas_m2[judged]
         out |= {"coverage_90": float(np.mean(covered)), "region_90_m2": float(np.median(areas))}
     return out
+
+
+def spoken(result: Run, truth: np.ndarray | None) -> list[str]:
+    """What `whisker localise` prints without --json: lines for a person."""
+    out, rows = summary(result, truth), len(result.table)
+    lines = [f"{result.name}: {rows} rows, {out['step_us_mean']:.0f} us each"]
+    if rows:
+        (x, y, theta), share = result.poses[-1], result.table["confidence"][-1]
+        lines += [
+            f"at the end: x {x:.3f} m, y {y:.3f} m, heading {np.degrees(theta):.1f} degrees, confidence {share:.2f}"
+        ]
+    if "pose_error_median_m" in out:
+        errors = [1000 * out[f"pose_error_{part}_m"] for part in ("median", "p90")]
+        heading = np.degrees(out["heading_error_median_rad"])
+        lines += [f"error: {errors[0]:.0f} mm median, {errors[1]:.0f} mm at 90 %; heading {heading:.1f} degrees median"]
+    if "coverage_90" in out:
+        judged = int(np.isfinite(result.levels).sum())
+        lines += [
+            f"the 90 % region holds the truth in {100 * out['coverage_90']:.1f} % of {judged} rows; "
+            f"half of them are below {1e4 * out['region_90_m2']:.0f} cm2"
+        ]
+    if result.bad_rows or result.bad_cells:
+        lines += [f"not used: {result.bad_rows} rows, {result.bad_cells} cells"]
+    return lines
 
 
 def warnings(result: Run) -> list[str]:

@@ -123,6 +123,30 @@ def test_wrong_arguments_are_one_line_and_exit_2(capsys, folder, arguments, comp
     assert code == 2 and complaint in err and err.count("\n") == 1
 
 
+def test_without_json_it_speaks_to_a_person(capsys, folder):
+    code, out, _ = run(capsys, "localise", folder)
+    found = json.loads(run(capsys, "localise", folder, "--json")[1])
+    lines = out.splitlines()
+    assert code == 0 and len(lines) <= 5
+    assert lines[0].startswith(f"adaptive: {found['steps']} rows, ") and "confidence" in lines[1]
+    assert f"{1000 * found['pose_error_median_m']:.0f} mm median" in lines[2]
+    assert f"{100 * found['coverage_90']:.1f} %" in lines[3]
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["locate"], "localise"),
+        (["localise", "--filtre", "grid"], "--filter"),
+        (["localise", "--jsn"], "--json"),
+        (["texture", "trian"], "train"),
+    ],
+)
+def test_a_word_that_is_nearly_right_is_named(capsys, words, meant):
+    code, _, err = run(capsys, *words)
+    assert code == 2 and f"did you mean {meant}?" in err and err.count("\n") == 1
+
+
 def test_a_scene_without_prior_or_observations_is_one_line(capsys, folder):
     (folder / "observations.csv").unlink()
     assert run(capsys, "localise", folder)[0] == 2
