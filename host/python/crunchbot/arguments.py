@@ -19,11 +19,25 @@ UNKNOWN = "unrecognized arguments: "  # as argparse begins it
 RING = "whisker"  # the name whiskerd's unit gives its ring
 
 
+class Help(argparse.RawDescriptionHelpFormatter):
+    """One style: arguments in capitals, and a default beside each text that does not tell it."""
+
+    def _get_help_string(self, action: argparse.Action) -> str:
+        text = action.help or ""
+        is_plain = (
+            action.nargs != 0 and action.default not in (None, argparse.SUPPRESS, "", []) and "default" not in text
+        )
+        return f"{text} (default: %(default)s)" if is_plain and action.option_strings else text
+
+    def _get_default_metavar_for_positional(self, action: argparse.Action) -> str:
+        return action.dest.upper()
+
+
 class Parser(argparse.ArgumentParser):
     """Complaints are one line; help keeps its line breaks."""
 
     def __init__(self, **options: Any):
-        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, **options)
+        super().__init__(formatter_class=Help, allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
         words = message.removeprefix(UNKNOWN).split() if message.startswith(UNKNOWN) else []
@@ -77,11 +91,9 @@ def plain(values: dict) -> dict:
 
 def add_ring(parser: argparse.ArgumentParser) -> None:
     """--ring, --ring-owner and --wait, for commands that read a ring."""
-    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to read (default: %(default)s)")
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to read")
     add_ring_owner(parser)
-    parser.add_argument(
-        "--wait", type=seconds, default=0.0, metavar="S", help="wait so long for the ring to come up (0)"
-    )
+    parser.add_argument("--wait", type=seconds, default=0.0, metavar="S", help="wait so long for the ring to come up")
 
 
 def add_ring_owner(parser: argparse.ArgumentParser) -> None:

@@ -91,6 +91,7 @@ class PrintCompletion(argparse.Action):
 
         whole = parser_of()
         for action in _actions_of(whole):
+            action.choices = action.choices or getattr(action, "values", None)
             if action.type in (Path, None) and action.nargs != 0 and not action.choices:
                 action.complete = shtab.FILE
         print(shtab.complete(whole, shell))

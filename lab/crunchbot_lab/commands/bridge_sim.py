@@ -31,7 +31,7 @@ LEVELS = ("rtl", "bytes")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring whiskerd makes (default: %(default)s)")
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring whiskerd makes")
     parser.add_argument(
         "--lanes", type=whole_number(1, LANES), metavar="N", help="populated lanes (the scene's whiskers)"
     )
@@ -39,16 +39,16 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "TOML: [[fault]] tables with tick or t_s, kind, and, for faults of a lane, lane (and bit or error)"
     parser.add_argument("--fault", metavar="FILE.TOML", help=text)
     parser.add_argument(
-        "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (a day)"
+        "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (default: a day)"
     )
-    text = "how finely whiskers bend (%(default)s)"
+    text = "how finely whiskers bend"
     parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0], help=text)
-    parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of world, sensors, start (1)")
-    text = "turn on the spot, stand still, or whisk: to one side and the other at a body whisk's rate (turn)"
+    parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of world, sensors, start")
+    text = "turn on the spot, stand still, or whisk: to one side and the other at a body whisk's rate"
     parser.add_argument("--drive", choices=list(COURSES), default="turn", help=text)
     text = "simulated seconds per second, at most what the machine can; 0: as fast as it can (default: 1)"
     parser.add_argument("--pace", type=number_above(-1e-9), default=1.0, metavar="X", help=text)
-    text = "how much of the bridge is simulated (%(default)s): the gateware, cycle by cycle, or only around requests and faults"
+    text = "how much of the bridge is simulated: the gateware, cycle by cycle, or only around requests and faults"
     parser.add_argument("--level", choices=LEVELS, default=LEVELS[0], help=text)
     text = (
         "no whiskerd: give the device to a Linux kernel by USB/IP, on this port of 127.0.0.1 (%(const)s; 0: a free one)"

@@ -17,7 +17,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "make", "draw a scene of a family, observations and truth included", EXAMPLE, make)
     p.add_argument("--family", metavar="F", help="a base and any modifiers, joined by '+'; see --list-families")
-    p.add_argument("--seed", type=int, default=0, help="draws arena, path and noise (default: %(default)s)")
+    p.add_argument("--seed", type=int, default=0, help="draws arena, path and noise")
     p.add_argument("--steps", type=int, metavar="N", help="rows of 0.1 s (default: the family's)")
     p.add_argument("--out", metavar="DIR", help="folder to write")
     p.add_argument("--list-families", action="store_true", help="print bases and modifiers and leave")

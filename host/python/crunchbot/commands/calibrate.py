@@ -42,9 +42,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--radii", type=number_list, metavar="LIST", help="distances of the post in mm, as in 90,100,110"
     )
-    parser.add_argument("--repeats", type=whole_number(1), default=5, metavar="N", help="whisks at each distance (5)")
+    parser.add_argument("--repeats", type=whole_number(1), default=5, metavar="N", help="whisks at each distance")
     parser.add_argument(
-        "--rest-seconds", type=number_above(0.2), default=2.0, metavar="S", help="how long rest is measured (2)"
+        "--rest-seconds", type=number_above(0.2), default=2.0, metavar="S", help="how long rest is measured"
     )
     parser.add_argument(
         "--whisk-rad-s", type=number_above(0.0), metavar="W", help="turning rate of the whisks, if known"

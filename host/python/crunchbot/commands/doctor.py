@@ -10,7 +10,7 @@ EXAMPLE = "whisker doctor --ring whisker"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring that should work (default: %(default)s)")
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring that should work")
     add_ring_owner(parser)
     text = "prove FPGA, FIFO and USB of a bridge that no whiskerd holds, by its own pattern; no node is needed"
     parser.add_argument("--pattern", action="store_true", help=text)

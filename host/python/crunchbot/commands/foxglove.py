@@ -17,10 +17,8 @@ PORT = 8765  # Foxglove's own
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE", help="the robot's scene folder")
-    parser.add_argument(
-        "--host", default="127.0.0.1", metavar="ADDRESS", help="to be reached at (default: %(default)s)"
-    )
-    parser.add_argument("--port", type=whole_number(0, 65535), default=PORT, metavar="N", help="(default: %(default)s)")
+    parser.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="to be reached at")
+    parser.add_argument("--port", type=whole_number(0, 65535), default=PORT, metavar="N", help="of the WebSocket")
     add_link(parser, [], [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT])
     parser.set_defaults(run=run)
 

@@ -13,10 +13,11 @@ EXAMPLE = "whisker localise examples/scene --filter grid --set grid.cell_m=0.1 -
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", nargs="?", help="folder with arena.toml, robot.toml, prior.toml, observations.csv")
-    parser.add_argument(
-        "--filter", default=localise.default_filter(), metavar="NAME", help="see --list-filters (default: %(default)s)"
+    named = parser.add_argument(
+        "--filter", default=localise.default_filter(), metavar="NAME", help="see --list-filters"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of every random draw (default: %(default)s)")
+    vars(named)["values"] = localise.filter_names()  # for a shell's completion
+    parser.add_argument("--seed", type=int, default=0, help="of every random draw")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting, see --list-settings"
     )

@@ -14,8 +14,8 @@ EXAMPLE = "whisker pyro --connect tcp/127.0.0.1:7458 --connect tcp/127.0.0.1:745
 
 def add(parser: argparse.ArgumentParser) -> None:
     add_link(parser, [], [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT])
-    parser.add_argument("--host", type=address, default="127.0.0.1", help="address to serve at (default: %(default)s)")
-    parser.add_argument("--port", type=whole_number(0, 65535), default=PORT, help="0 takes a free one (%(default)s)")
+    parser.add_argument("--host", type=address, default="127.0.0.1", help="address to serve at")
+    parser.add_argument("--port", type=whole_number(0, 65535), default=PORT, help="0 takes a free one")
     text = "let clients write rows, as the paper's netbook did; without a pilot beside it"
     parser.add_argument("--write", action="store_true", help=text)
     parser.set_defaults(run=run)

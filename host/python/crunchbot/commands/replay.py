@@ -13,7 +13,7 @@ EXAMPLE = "whisker replay examples/drive.mcap --speed 2 --ring replayed"
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE.MCAP")
-    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to make (default: %(default)s)")
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to make")
     text = "how many times as fast as it was recorded, or max: as fast as the machine can; readers that fall behind by more than the ring lose frames"
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="X", help=text)
     parser.add_argument(
@@ -21,11 +21,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         type=whole_number(64, 1 << 20),
         default=CAPACITY,
         metavar="N",
-        help="a power of two (%(default)s)",
+        help="a power of two",
     )
-    parser.add_argument(
-        "--lead", type=seconds, default=0.5, metavar="S", help="let readers attach for so long first (0.5)"
-    )
+    parser.add_argument("--lead", type=seconds, default=0.5, metavar="S", help="let readers attach for so long first")
     parser.set_defaults(run=run)
 
 

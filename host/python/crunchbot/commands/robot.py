@@ -30,35 +30,29 @@ PORT = Path("/dev/ttyUSB0")
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", nargs="?", type=Path, metavar="SCENE", help="scene folder: arena, robot, prior")
     parser.add_argument("--models", type=Path, metavar="DIR", help="folder with texture.json and <whisker>.json")
-    parser.add_argument("--create", type=int, choices=(1, 2), default=1, help="the base: iRobot Create (%(default)s)")
-    parser.add_argument("--port", type=Path, default=PORT, help="the base's serial port (default: %(default)s)")
-    parser.add_argument("--ring", default=RING, metavar="NAME", help="whiskerd's ring (default: %(default)s)")
+    parser.add_argument("--create", type=int, choices=(1, 2), default=1, help="the base: iRobot Create")
+    parser.add_argument("--port", type=Path, default=PORT, help="the base's serial port")
+    parser.add_argument("--ring", default=RING, metavar="NAME", help="whiskerd's ring")
     text = "use the whiskerd that runs, systemd's for instance, by its --ring"
     parser.add_argument("--no-daemon", action="store_true", help=text)
     text = "as --desktop, with a mapper in the navigator's place: of the scene only robot.toml is used, and the map is kept"
     parser.add_argument("--map", action="store_true", help=text)
     parser.add_argument("--desktop", action="store_true", help="also the desktop's side: navigator, bag, view")
-    parser.add_argument(
-        "--view-port", type=whole_number(0, 65535), default=VIEW_PORT, metavar="N", help="(%(default)s)"
-    )
-    parser.add_argument(
-        "--out", type=Path, default=Path("robot-run"), metavar="DIR", help="logs, bag, truth (robot-run)"
-    )
+    parser.add_argument("--view-port", type=whole_number(0, 65535), default=VIEW_PORT, metavar="N", help="of the page")
+    parser.add_argument("--out", type=Path, default=Path("robot-run"), metavar="DIR", help="logs, bag, truth")
     parser.add_argument("--no-view", action="store_true", help="no page for a browser")
-    parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of turns and simulation (1)")
+    parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of turns and simulation")
     add_choices(parser)
     text = "be reached at this address, by anyone who reaches it (default: this machine only)"
     parser.add_argument("--listen", default=parts.LOOPBACK, metavar="ADDRESS", help=text)
-    text = "of three, for supervisor, pilot and navigator (default: %(default)s)"
+    text = "of three, for supervisor, pilot and navigator"
     parser.add_argument("--first-port", type=whole_number(1, 65533), default=parts.FIRST_PORT, metavar="N", help=text)
     add_zenoh_config(parser, "become tls/ADDRESS:PORT")
     text = "no hardware: the scene (default: the demo's of this seed) with a simulated robot, at the wall clock's pace"
     parser.add_argument("--simulated", action="store_true", help=text)
+    parser.add_argument("--level", choices=("bytes", "rtl"), default="bytes", help="of the simulated bridge")
     parser.add_argument(
-        "--level", choices=("bytes", "rtl"), default="bytes", help="of the simulated bridge (%(default)s)"
-    )
-    parser.add_argument(
-        "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (a day)"
+        "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (default: a day)"
     )
     parser.add_argument("--pace", type=number_above(0.0), default=1.0, metavar="X", help="simulated seconds per second")
     text = "write systemd units that start these processes on a real robot into this folder, and start nothing"

@@ -25,7 +25,7 @@ RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE", help="the robot's scene folder")
-    text = "which implementation of ROS 2's middleware reads it (default: %(default)s)"
+    text = "which implementation of ROS 2's middleware reads it"
     parser.add_argument("--rmw", choices=(ZENOH, CYCLONE), default=ZENOH, help=text)
     domain = os.environ.get(DOMAIN_VARIABLE) or "0"
     text = f"of ROS 2 (default: {DOMAIN_VARIABLE}, or 0)"

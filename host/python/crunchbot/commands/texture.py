@@ -32,7 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     p = add_action(actions, "classify", "classify the surface window by window", example, classify)
     p.add_argument("model")
     p.add_argument("recording", help="a CSV file, or a folder as for 'train': then a confusion matrix")
-    p.add_argument("--window-ms", type=float, default=100.0, help="length of a window (default: %(default)s)")
+    p.add_argument("--window-ms", type=float, default=100.0, help="length of a window")
     p.add_argument("--sequential", action="store_true", help='answer as soon as sure, "unknown" after four windows')
     p.add_argument("--json", action="store_true", help="one object per line and window; of a folder: per surface")
 

@@ -21,7 +21,7 @@ VEHICLE = Vehicle(EXPLORE_M_S, TURN_RAD_S, CLEAR_M / EXPLORE_M_S, 0.25)
 
 def add_choices(parser: argparse.ArgumentParser) -> None:
     """--choose, for commands that start a pilot."""
-    text = "turns and distances: at random, or map: to new floor, by a map of the pilot's own (%(default)s)"
+    text = "turns and distances: at random, or map: to new floor, by a map of the pilot's own"
     parser.add_argument("--choose", choices=(RANDOM, MAP), default=RANDOM, help=text)
 
 

@@ -56,13 +56,13 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="a process of the robot; repeatable (default: pilot and navigator of this machine)",
     )
     add_zenoh_config(parser)
-    parser.add_argument("--port", type=_port, default=PORT, help="0 takes a free one (default: %(default)s)")
+    parser.add_argument("--port", type=_port, default=PORT, help="0 takes a free one")
     parser.add_argument(
         "--host",
         type=_address,
         default="127.0.0.1",
         metavar="ADDRESS",
-        help="address to serve at (default: %(default)s)",
+        help="address to serve at",
     )
     parser.add_argument(
         "--allow-host",

@@ -1,5 +1,6 @@
 """The commands that watch a ring: info, top, stream, record and replay; in a terminal where they have one."""
 
+import argparse
 import contextlib
 import json
 import os
@@ -255,3 +256,29 @@ def test_metadata_of_lane_names_is_checked(tmp_path):
     with pytest.raises(ValueError, match="lane names"):
         RecordingWriter(tmp_path / "a.mcap", {}, ["a,b"])
     assert not (tmp_path / "a.mcap").exists()
+
+
+def options(parser):
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for inner in action.choices.values():
+                yield from options(inner)
+        elif action.nargs != 0 and action.help != argparse.SUPPRESS:
+            yield parser, action
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_arguments_are_shown_in_capitals_and_each_default_is_given_once(name):
+    for parser, action in options(parser_of(name)):
+        shown = " ".join(parser.format_help().split())
+        first = action.metavar or (action.option_strings or [action.dest.upper()])[0]
+        assert first.startswith("-") or first != first.lower(), (name, first)
+        if action.option_strings and action.default not in (None, "", [], argparse.SUPPRESS):
+            given = parser._get_formatter()._expand_help(action)
+            assert given.count("default") == 1 and " ".join(given.split())[:40] in shown, (name, first, given)
+
+
+def test_a_shell_completes_the_names_of_filters(capsys):
+    with pytest.raises(SystemExit):
+        parser_of().parse_args(["--print-completion", "bash"])
+    assert "ukf" in capsys.readouterr().out

@@ -14,7 +14,7 @@ NOWHERE = "none"
 
 def add_link(parser: argparse.ArgumentParser, listen: Sequence[str], connect: Sequence[str]) -> None:
     """--robot, --listen, --connect, --scout, --zenoh-config and --lock-step; `listen` and `connect`: what holds when none is given."""
-    parser.add_argument("--robot", default=ROBOT, metavar="NAME", help="which robot (default: %(default)s)")
+    parser.add_argument("--robot", default=ROBOT, metavar="NAME", help="which robot")
     for option, standard, what in (
         ("--listen", listen, "endpoint to be reached at"),
         ("--connect", connect, "endpoint of another process"),
