@@ -300,6 +300,11 @@ class Reader:
         known = lib.whisker_reader_clock(self._reader, clock) == 0 and clock.ns_per_cycle > 0.0
         return Clock(*(getattr(clock, field) for field in Clock.__dataclass_fields__)) if known else None
 
+    def age_s(self, time_cycles: int) -> float | None:
+        """How long ago the bridge's clock stood there, by the latest mapping; None before the first."""
+        clock = self.clock
+        return None if clock is None else max(0.0, (time.monotonic_ns() - int(clock.monotonic(time_cycles))) / 1e9)
+
     @property
     def stats(self) -> DaemonStats | None:
         """What the daemon last published of itself; None when the ring's writer is none (a replay, say)."""

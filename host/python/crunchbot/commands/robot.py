@@ -19,6 +19,7 @@ from ..robot.processes import holders, parts
 from ..robot.processes.logs import run_folder
 from ..robot.processes.supervisor import Supervisor
 from ..robot.processes.units import TARGET, Installed, units
+from ..robot.terminal import Terminal
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker robot --simulated --desktop"
@@ -54,7 +55,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (default: a day)"
     )
-    parser.add_argument("--pace", type=number_above(0.0), default=1.0, metavar="X", help="simulated seconds per second")
+    text = "simulated seconds per second, at most (%(default)s): a busy machine that loses samples needs less"
+    parser.add_argument("--pace", type=number_above(0.0), default=1.0, metavar="X", help=text)
     text = "write systemd units that start these processes on a real robot into this folder, and start nothing"
     parser.add_argument("--units", type=Path, metavar="DIR", help=text)
     parser.set_defaults(run=run)
@@ -76,9 +78,15 @@ def run(arguments: argparse.Namespace) -> int:
                 TruthWatcher(meeting.simulation, link, stop).start()
             until = parts.BRIDGE if arguments.simulated else None
             print(f"starting {', '.join(program.name for program in table)}; logs: {logs}", flush=True)
+            page = logs / "view.log" if arguments.desktop and not arguments.no_view else None
+            Terminal(arguments.ring, page, arguments.pace, stop, _tell).start()
             ended = Supervisor(table, logs, link, until).run(stop)
     print(f"all ended: {ended}")
     return 0
+
+
+def _tell(line: str) -> None:
+    print(f"whisker: {line}", file=sys.stderr, flush=True)
 
 
 def _write_units(arguments) -> int:

@@ -16,6 +16,7 @@ import numpy as np
 from whisker_protocol import LANES, LIMITS
 
 from ..arguments import add_ring, number_above
+from ..bridge.flow import Flow, tick_s
 from ..bridge.ring import FRAME, Reader, RingError, await_reader
 from ..bridge.status import explain
 from ..scene import load
@@ -23,6 +24,7 @@ from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker top --ring whisker"
 WINDOW_S = 2.0
+STALL_S = 1.0  # what is older is not how it is
 STOP_S = 0.2  # how soon a signal is noticed
 BARS = "▁▂▃▄▅▆▇█"
 BARS_SPAN = 256  # counts from the lowest bar to the highest, at least: noise is to look flat
@@ -95,10 +97,13 @@ class View:
         self._reader = reader
         self._names = names + [f"lane{n}" for n in range(len(names), LANES)]
         self._kept: deque[np.ndarray] = deque()
+        self._flow, self._came_s = Flow(), time.monotonic()
         self.open = True
+        self._flow.look(reader)
 
     def update(self) -> None:
         """Take what is new. `open` turns false when the ring is closed; RingError when its writer has died."""
+        self._flow.look(self._reader)
         try:
             frames = self._reader.take(0.0)
         except RingError as error:
@@ -109,6 +114,7 @@ class View:
             self.open = False
         elif len(frames):
             self._kept.append(frames)
+            self._came_s = time.monotonic()
             oldest = frames["time_cycles"][-1] - min(frames["time_cycles"][-1], round(WINDOW_S * LIMITS["clock_hz"]))
             while self._kept[0]["time_cycles"][-1] < oldest:
                 self._kept.popleft()
@@ -122,10 +128,23 @@ class View:
         body = [self._lane(frames, lane, room) for lane in lanes]
         return [line[:width] for line in [*self._status(frames), heading, *body]]
 
+    def _age_s(self, frames: np.ndarray) -> float:
+        """Of the newest frame: by the bridge's clock where that is known, else since it came."""
+        age_s = self._reader.age_s(int(frames["time_cycles"][-1])) if len(frames) else None
+        return time.monotonic() - self._came_s if age_s is None else age_s
+
     def _status(self, frames: np.ndarray) -> list[str]:
         info, stats, clock = self._reader.info, self._reader.stats, self._reader.clock
+        rate, age_s, loss = self._flow.rate(), self._age_s(frames), self._flow.loss()
         lost = f"{info.frames_missing} lost, {info.frames_overrun} not read in time"
-        out = [f"ring {self._reader.name} of user {self._reader.owner}: {_rate(frames):.1f} frames/s, {lost}; q quits"]
+        newest = f"the newest {age_s:.1f} s ago" if len(frames) else "none yet"
+        out = [f"ring {self._reader.name} of user {self._reader.owner}: {lost}; q quits"]
+        out.append(f"{rate:.1f} frames/s, {rate * tick_s(stats):.2f} of real time, {newest}")
+        if loss:
+            share, why, remedy = loss
+            out.append(f"! {100 * share:.2g} % of the samples are lost: {why}; {remedy}")
+        elif age_s > STALL_S:
+            out.append(f"! no frame for {age_s:.1f} s: what is shown is how it was; whisker doctor finds out why")
         if stats:
             state = "connected" if stats.connected else "no bridge"
             text = f"bridge {stats.serial} {state}, wire version {stats.wire_version}, {stats.reconnects} reconnects"
@@ -135,7 +154,7 @@ class View:
     def _lane(self, frames: np.ndarray, lane: int, room: int) -> str:
         samples = frames["lane"][:, lane]
         good = samples[samples["status"] == 0]
-        rate = _rate(frames) * len(good) / len(frames)
+        rate = self._flow.rate() * len(good) / len(frames)
         bad = 100 * (1 - len(good) / len(frames))
         begin = f"{lane:>2} {self._names[lane]:<15.15}"
         if len(good) == 0:
@@ -159,12 +178,6 @@ def sparkline(values: np.ndarray, width: int) -> str:
     if span == BARS_SPAN:
         low -= span / len(BARS) / 2  # what is at rest stays in the middle of one bar
     return "".join(BARS[min(len(BARS) - 1, int((mean - low) / span * len(BARS)))] for mean in means)
-
-
-def _rate(frames: np.ndarray) -> float:
-    """Frames per second of the bridge's clock."""
-    cycles = int(frames["time_cycles"][-1]) - int(frames["time_cycles"][0]) if len(frames) > 1 else 0
-    return (len(frames) - 1) * LIMITS["clock_hz"] / cycles if cycles > 0 else 0.0
 
 
 def _lanes(mask: int) -> list[int]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from whisker_protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
 
+from ..bridge.flow import Flow
 from ..bridge.ring import Reader, RingError, error_line
 from .pyramid import BINS, CHUNK, WIDTHS, Pyramid
 from .tally import NAME_OF_CODE, Tally
@@ -16,7 +17,6 @@ from .tally import NAME_OF_CODE, Tally
 CHUNKS = 8  # read at most in one poll: a ring written faster than we read must not hold up the pages
 RETRY_S = 0.5  # between looks for a ring that is not there
 STALL_S = 1.0  # without a frame
-RATE_S = 2.0  # over which the frame rate is taken
 FRESH_S = 1.0  # a lane is good if it delivered a good record in this time before the newest frame
 EVENTS = 20
 GAP_MAX = BINS * WIDTHS[-1]  # slots; the longest outage that is drawn to scale
@@ -35,7 +35,7 @@ class Tap:
         self._trouble: RingError | None = None  # why no frames come
         self._flowing = False  # attached, to a ring that is not known to have ended
         self._next_try = self._last_frame = self._since = clock()
-        self._rate = deque([(clock(), 0)])
+        self._flow = Flow(clock)
         self._restarts = 0
         self._last: np.ndarray | None = None  # the newest frame, (1,)
         self._good_slot = np.full(LANES, NEVER, np.int64)
@@ -56,9 +56,8 @@ class Tap:
         if self._flowing:
             self._read(now)
         self._note_stall(now)
-        while len(self._rate) > 1 and now - self._rate[0][0] > RATE_S:
-            self._rate.popleft()
-        self._rate.append((now, self.tally.frames))
+        if self._reader:
+            self._flow.look(self._reader, self.tally.dropped)
 
     def _try_attach(self, now: float) -> None:
         self._next_try = now + RETRY_S
@@ -110,7 +109,8 @@ class Tap:
         good = frames["lane"]["status"] == 0
         newest = len(frames) - 1 - np.argmax(good[::-1], axis=0)
         self._good_slot = np.where(good.any(axis=0), slots[newest], self._good_slot)
-        self._last, self._last_frame = frames[-1:], now
+        waited_s = self._reader.age_s(int(frames["time_cycles"][-1])) or 0.0  # in the ring, before this view came
+        self._last, self._last_frame = frames[-1:], now - waited_s
 
     def _slots(self, ticks: np.ndarray, now: float) -> np.ndarray:
         """Slots of frames: as ticks, but where the tick goes back (a new start) they go on after the time it took."""
@@ -162,7 +162,8 @@ class Tap:
             "attached_s": round(now - self._since, 1) if reader else None,
             "age_s": round(now - self._last_frame, 3) if self.tally.frames else None,
             "tick_s": self.tick_s,
-            "frames_per_s": round(self._frames_per_s(), 1),
+            "frames_per_s": round(self._flow.rate(), 1),
+            "loss": self._flow.loss(),
             "frames": self.tally.frames,
             "dropped": self.tally.dropped,
             "restarts": self._restarts,
@@ -179,10 +180,6 @@ class Tap:
         if stats is None:
             return None
         return asdict(stats) | {"trouble": error_line(stats.error) if stats.error else None}
-
-    def _frames_per_s(self) -> float:
-        (t0, n0), (t1, n1) = self._rate[0], self._rate[-1]
-        return (n1 - n0) / (t1 - t0) if t1 > t0 else 0.0
 
     def _lanes(self) -> dict | None:
         """Per lane: state ("good", or the kind of its newest record), last counts, good and lost records."""

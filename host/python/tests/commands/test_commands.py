@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import threading
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,7 +19,8 @@ from patience import PATIENCE_S
 from rings import make_frames, ring_name
 
 from crunchbot import __version__
-from crunchbot.bridge.ring import Writer
+from crunchbot.bridge.flow import Flow
+from crunchbot.bridge.ring import Clock, Writer
 from crunchbot.cli import COMMANDS, PARTS, main, parser_of
 from crunchbot.commands import info
 from crunchbot.commands.top import BARS, sparkline
@@ -229,8 +231,43 @@ def test_top_draws_in_a_terminal_and_leaves_it_as_it_was():
         os.close(ours)
     text = seen.decode()
     assert text.startswith("\x1b[?1049h\x1b[?25l") and text.rstrip().endswith("\x1b[?25h\x1b[?1049l")
-    assert "2000.0 frames/s" in text and "27 lane27" in text and "bridge B0042 connected" in text
+    assert "0.0 frames/s" in text and "no frame for" in text and "27 lane27" in text and "bridge B0042 connected" in text
     assert any(bar in text for bar in BARS)
+
+
+def test_top_says_how_old_what_it_shows_is(capsys):
+    """A writer that stands still gives no rate, and the traces are of then."""
+    with Writer(ring_name()) as writer:
+        frames = make_frames(2000)
+        now = time.monotonic_ns() - 10 * 10**9  # the first frame's
+        writer.set_clock(Clock(0, now, 0, 1e9 / LIMITS["clock_hz"], 1e3))
+        writer.publish(frames)
+        code, out, _ = run(capsys, "top", "--ring", writer.name, "--once", "--interval", 0.01)
+    age_s = float(re.search(r"0\.0 frames/s, 0\.00 of real time, the newest (\S+) s ago\n", out)[1])
+    assert code == 0 and 9.0 <= age_s < 9.0 + PATIENCE_S
+    assert f"! no frame for {age_s} s: what is shown is how it was" in out
+    rates = [float(line.split()[5]) for line in out.splitlines() if "lane1" in line]
+    assert rates and set(rates) == {0.0}
+
+
+def test_a_ring_says_what_share_is_lost_and_why():
+    clock = SimpleNamespace(now=0.0)
+    flow = Flow(lambda: clock.now)
+    assert flow.rate() == 0.0 and flow.loss() is None
+    flow.add(100, 50, 0)  # lost before
+    for step in range(1, 11):
+        clock.now = 0.1 * step
+        flow.add(100 + 100 * step, 50 + 25 * step, 20 * step)
+    share, why, remedy = flow.loss()
+    assert (share, flow.rate()) == (0.2, pytest.approx(1000.0)) and "the bridge dropped them" in why and "--pace" in remedy
+    flow.add(1200, 900, 200)
+    assert "never came over the USB" in flow.loss()[1]
+    for step in range(11, 35):
+        clock.now = 0.1 * step
+        flow.add(1200, 900, 200)
+    assert flow.loss() is None and flow.rate() == 0.0
+    flow.add(0, 0, 0)  # the writer was started again
+    assert flow.loss() is None and flow.rate() == 0.0
 
 
 def test_top_once_is_plain_text(capsys):

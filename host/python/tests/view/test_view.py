@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 from urllib.request import urlopen
 
@@ -107,7 +108,7 @@ def test_status_counts_what_the_ring_counts():
             assert reported["lanes"]["alpha"][0] == frames["lane"]["alpha"][-1, 0]
             assert reported["tick_s"] == pytest.approx(500e-6)
             assert reported["clock"] is None and reported["daemon"] is None
-            writer.set_clock(Clock(0, 1, 2, 50 / 3, 1500.0))
+            writer.set_clock(Clock(0, time.monotonic_ns(), 2, 50 / 3, 1500.0))
             writer.set_stats(frames=9, started_ns=1, reconnects=2, wire_version=1, error=-40, serial=b"CB-7")
             reported = await p.status_where(lambda s: s["daemon"])
             assert reported["clock"]["uncertainty_ns"] == 1500.0

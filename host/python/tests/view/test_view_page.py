@@ -1,13 +1,16 @@
 """The page of whisker-view in headless Chromium: what a person sees equals what the ring holds."""
 
 import asyncio
+import time
 from contextlib import asynccontextmanager
+from itertools import count
 
 import chromium
 import numpy as np
 import pytest
 from rings import ring_name
 from viewkit import NODES, flowing, made_frames, ring_of, spoil, view_of
+from viewrobot import SCENE, MadeUpRun, Post
 
 from crunchbot.bridge.ring import Clock
 from crunchbot.view.hub import Hub
@@ -64,7 +67,7 @@ def test_counters_health_and_lanes_are_those_of_the_ring():
     frames["dropped"][900:] = 4
 
     async def scenario(writer):
-        writer.set_clock(Clock(0, 1, 2, 50 / 3, 1500.0))
+        writer.set_clock(Clock(0, time.monotonic_ns(), 2, 50 / 3, 1500.0))
         writer.set_stats(started_ns=1, connected=1, wire_version=1, serial=b"CB-0007", reconnects=3)
         async with looking_at(writer.name) as b:
             await b.until("document.querySelector('#tile-frames b').textContent === '1\u202f993'")
@@ -205,6 +208,42 @@ def test_without_a_ring_the_page_says_what_to_do_and_goes_on_by_itself():
             assert "The ring has ended" in said
 
     asyncio.run(scenario())
+
+
+@asynccontextmanager
+async def losing(writer):
+    """While this lasts, the bridge drops as many frames as come."""
+
+    async def drop_for_ever():
+        for n in count(1):
+            writer.set_stats(started_ns=1, connected=1, frames_missing=64 * n, frames_dropped=64 * n)
+            await asyncio.sleep(0.032)
+
+    task = asyncio.create_task(drop_for_ever())
+    yield
+    task.cancel()
+
+
+@pytest.mark.parametrize("part", ["traces", "robot"])
+def test_the_header_says_what_share_is_lost_and_what_helps(part):
+    pill, note = ("state", "banner") if part == "traces" else ("robot-state", "robot-note")
+
+    async def scenario(writer):
+        post = Post()
+        hub = Hub([writer.name], post.source, SCENE)
+        hub.robot._clock = lambda: 0.0  # what it heard does not age
+        post.play(MadeUpRun(), range(50), hub.robot)
+        async with serving(hub, "127.0.0.1", 0, []) as port, chromium.browser() as b:
+            async with flowing(writer, 640):
+                await b.look(f"http://127.0.0.1:{port}/#part={part}")
+                await b.until(f"$('{pill}').dataset.state === 'live'")
+                async with losing(writer):
+                    said = await b.until(f"$('{pill}').textContent.includes('lost') && $('{note}').innerText")
+            assert "% of the samples lost" in said and "dropped them" in said and "--pace 0.3" in said
+
+    with ring_of(made_frames(0, 640)) as writer:
+        writer.set_stats(started_ns=1, connected=1)
+        asyncio.run(scenario(writer))
 
 
 def test_when_whisker_view_goes_the_page_says_so_and_finds_it_again():

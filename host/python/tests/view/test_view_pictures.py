@@ -89,7 +89,7 @@ def test_pictures_of_traces(name, theme, tmp_path):
             assert b.troubles == []
 
     with Writer("whisker" if folder == PICTURES else ring_name(), RING) as writer:
-        writer.set_clock(Clock(0, 1, 2, 50 / 3, 1500.0))
+        writer.set_clock(Clock(0, time.monotonic_ns(), 2, 50 / 3, 1500.0))
         writer.set_stats(started_ns=time.time_ns(), connected=1, wire_version=WIRE_VERSION, serial=b"0001")
         writer.publish(frames[:SHOWN])
         asyncio.run(scenario(writer))

@@ -1,5 +1,6 @@
 /* What topic status holds, as words and numbers: banner, tiles, health, lanes, kinds of bad records, events. */
 const STATES = { live: '● live', stalled: '▲ no frames', waiting: '○ no ring', ended: '■ ended', refused: '■ refused', gone: '■ not connected' };
+const EVEN = 0.9; // of real time: what is slower is said (bridge/flow.py)
 const EMPTY = ['absent', 'lane_off']; // no loss: there is no node, or the lane is off
 
 /* What a person can do next: [grave, headline, line, steps], or null when all is well. */
@@ -26,7 +27,19 @@ function advice(s, others) {
       return [true, s.age_s === null ? 'No frame yet' : `No frame for ${duration(s.age_s)}`, `${s.daemon?.trouble ?? 'The daemon runs, but no frames come'}. ${goesOn}`, [
         'Check the cable and the power of the bridge.', '`whisker doctor` finds out why.']];
   }
-  return null;
+  return flowSaid(s)?.advice ?? null;
+}
+
+/* Of a live ring: the pill's state and text where samples are lost or come slower than life, and advice; null: all is well. */
+function flowSaid(s) {
+  if (s?.state !== 'live') return null;
+  if (s.loss) {
+    const [share, why, remedy] = s.loss;
+    const lost = `${(100 * share).toPrecision(2)} % of the samples lost`;
+    return { state: 'stalled', pill: `▲ ${lost}`, advice: [true, lost, `In the last seconds: ${why}.`, [remedy]] };
+  }
+  const pace = s.frames_per_s * s.tick_s;
+  return pace < EVEN ? { state: 'live', pill: `● live, ${pace.toFixed(2)} × real time` } : null;
 }
 
 class Panels {
@@ -63,8 +76,8 @@ class Panels {
   }
 
   status(s, others, toDegrees) {
-    $('state').textContent = STATES[s.state];
-    $('state').dataset.state = s.state;
+    $('state').textContent = flowSaid(s)?.pill ?? STATES[s.state];
+    $('state').dataset.state = flowSaid(s)?.state ?? s.state;
     $('banner').dataset.state = s.state;
     this.banner(advice(s, others));
     if (s.state === 'gone') return;

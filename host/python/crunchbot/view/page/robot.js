@@ -100,14 +100,15 @@ class RobotPart {
   takeRing(status) {
     if (this.player.on) return;
     this.ring = status;
-    if (this.world.word) tellProcesses(this.world.word, status);
+    if (this.world.word) this.tell(this.world.word);
   }
 
   tell(word) {
     const advice = robotAdvice(word);
-    this.note(advice);
+    const flow = this.ring && flowSaid(this.ring);
+    this.note(advice ?? flow?.advice);
     if (word.playback) this.pill(word.playback.playing ? 'live' : 'paused', word.playback.playing ? '▶ recording' : '❚❚ recording');
-    else if (!advice) this.pill('live', '● live');
+    else if (!advice) this.pill(flow?.state ?? 'live', flow?.pill ?? '● live');
     else if (word.heard_s !== null) this.pill('stalled', '▲ silent');
     else this.pill('waiting', word.link.state === 'off' ? '○ no robot' : '○ not heard yet');
     tellPose(word, this.world.belief);
