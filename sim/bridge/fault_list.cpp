@@ -41,22 +41,32 @@ template <typename Fault> void append(std::vector<Fault> &faults, const Fault &f
     faults.push_back(fault);
 }
 
+void require_populated(size_t lane, size_t lanes)
+{
+    if (lane >= lanes) {
+        throw std::runtime_error("lane " + std::to_string(lane) + " is not populated; give 0 to " +
+                                 std::to_string(lanes - 1));
+    }
+}
+
 void read_line(const std::string &line, size_t lanes, FaultList &list)
 {
     char kind[KIND_BYTES] = "";
     uint64_t tick = 0;
+    uint64_t until = 0;
     size_t lane = 0;
     unsigned argument = 0;
     if (std::sscanf(line.c_str(), "lane %" SCNu64 " %zu %31s %u", &tick, &lane, kind, &argument) == 4) {
-        if (lane >= lanes) {
-            throw std::runtime_error("lane " + std::to_string(lane) + " is not populated; give 0 to " +
-                                     std::to_string(lanes - 1));
-        }
+        require_populated(lane, lanes);
         append(list.lane, LaneFault{tick, lane, kind_of<LaneFaultKind>(kind, LANE_FAULT_KINDS), argument});
     } else if (std::sscanf(line.c_str(), "usb %" SCNu64 " %31s", &tick, kind) == 2) {
         append(list.usb, UsbFault{tick, kind_of<UsbFaultKind>(kind, USB_FAULT_KINDS)});
+    } else if (std::sscanf(line.c_str(), "lasting %" SCNu64 " %" SCNu64 " %zu %31s", &tick, &until, &lane, kind) == 4) {
+        require_populated(lane, lanes);
+        list.lasting.push_back({tick, until, lane, kind_of<LastingKind>(kind, LASTING_KINDS)});
     } else {
-        throw std::runtime_error("'" + line + "'; give 'lane TICK LANE KIND ARGUMENT' or 'usb TICK KIND'");
+        throw std::runtime_error(
+            "'" + line + "'; give 'lane TICK LANE KIND ARGUMENT', 'usb TICK KIND' or 'lasting TICK UNTIL LANE KIND'");
     }
 }
 

@@ -65,6 +65,12 @@ const char *fault_name(UsbFaultKind kind)
     return names[static_cast<unsigned>(kind)];
 }
 
+const char *fault_name(LastingKind kind)
+{
+    static const std::array<const char *, LASTING_KINDS> names = {"sensor_dead", "sensor_frozen", "link_dead"};
+    return names[static_cast<unsigned>(kind)];
+}
+
 bool costs_resync(LaneFaultKind kind)
 {
     return kind == LaneFaultKind::SENSOR_FLIP || kind == LaneFaultKind::SENSOR_DEAD ||
@@ -78,11 +84,17 @@ FaultPlan::FaultPlan(uint64_t seed, size_t lanes, uint64_t last_tick)
 {
 }
 
-FaultPlan::FaultPlan(std::vector<LaneFault> lane_faults, std::vector<UsbFault> usb_faults)
-    : given_(true), lane_list_(std::move(lane_faults)), usb_list_(std::move(usb_faults))
+FaultPlan::FaultPlan(std::vector<LaneFault> lane_faults, std::vector<UsbFault> usb_faults,
+                     std::vector<LastingFault> lasting)
+    : given_(true), lane_list_(std::move(lane_faults)), usb_list_(std::move(usb_faults)), lasting_(std::move(lasting))
 {
     std::reverse(lane_list_.begin(), lane_list_.end());
     std::reverse(usb_list_.begin(), usb_list_.end());
+}
+
+const std::vector<LastingFault> &FaultPlan::lasting() const
+{
+    return lasting_;
 }
 
 // Not a standard distribution: those may differ from one C++ library to the next.

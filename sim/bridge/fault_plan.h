@@ -32,7 +32,18 @@ struct UsbFault {
     UsbFaultKind kind;
 };
 
+// What lasts. The bridge sees nothing but other records.
+enum class LastingKind { SENSOR_DEAD, SENSOR_FROZEN, LINK_DEAD };
+constexpr unsigned LASTING_KINDS = 3;
+
+struct LastingFault {
+    uint64_t tick, until; // of the first record, and of the first one that is well again
+    size_t lane;
+    LastingKind kind;
+};
+
 const char *fault_name(LaneFaultKind kind);
+const char *fault_name(LastingKind kind);
 const char *fault_name(UsbFaultKind kind);
 
 // A sensor frame that does not pass its checks costs this record and the next (resynchronisation).
@@ -46,7 +57,11 @@ class FaultPlan
     FaultPlan(uint64_t seed, size_t lanes, uint64_t last_tick);
 
     // These and no others; each list by rising tick.
-    FaultPlan(std::vector<LaneFault> lane_faults, std::vector<UsbFault> usb_faults);
+    FaultPlan(std::vector<LaneFault> lane_faults, std::vector<UsbFault> usb_faults,
+              std::vector<LastingFault> lasting = {});
+
+    // Those that last, in no order.
+    const std::vector<LastingFault> &lasting() const;
 
     // The fault of this tick, if any. Ticks must be asked for in rising order, each at most once per kind of fault.
     std::optional<LaneFault> lane_fault(uint64_t tick);
@@ -61,6 +76,7 @@ class FaultPlan
     bool given_ = false;
     std::vector<LaneFault> lane_list_; // given ones still to come, the next one last
     std::vector<UsbFault> usb_list_;
+    std::vector<LastingFault> lasting_;
     std::mt19937_64 lane_generator_;
     std::mt19937_64 usb_generator_;
     size_t lanes_ = 0;

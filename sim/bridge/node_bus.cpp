@@ -78,6 +78,11 @@ void NodeBus::spoil_transfer(size_t lane, LinkFault kind, unsigned bit)
     fault_bit_ = bit;
 }
 
+void NodeBus::cut(uint32_t lanes)
+{
+    broken_ = lanes;
+}
+
 void NodeBus::fail_supplies()
 {
     for (SupplyCut &cut : cuts_) {
@@ -151,7 +156,8 @@ std::array<uint64_t, LANES> NodeBus::transfer(uint64_t order)
 {
     arrived_.fill(UINT64_MAX);
     for (size_t lane = 0; lane < nodes_.size(); lane++) {
-        sent_[lane] = arrived_[lane] = sim_node_transfer(nodes_[lane].get(), order);
+        sent_[lane] = sim_node_transfer(nodes_[lane].get(), order);
+        arrived_[lane] = broken_ >> lane & 1u ? UINT64_MAX : sent_[lane];
     }
     previous_ = sent_;
     return arrived_;
@@ -193,7 +199,7 @@ void NodeBus::sck_edge(bool level, bool mosi)
         }
     }
     bits_ += level ? 1 : 0;
-    miso_ = driven_;
+    miso_ = driven_ | broken_;
     if (fault_ != LinkFault::NONE) {
         damage();
     }

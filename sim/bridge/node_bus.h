@@ -48,6 +48,9 @@ class NodeBus
     // Spoils the next transfer of one lane; `bit` counts from the first bit on the wire and is used by FLIP only.
     void spoil_transfer(size_t lane, LinkFault kind, unsigned bit);
 
+    // The cables of these lanes, a bit each, are broken: the bridge reads ones. All others are whole.
+    void cut(uint32_t lanes);
+
     // Levels of the bridge's outputs now; returns the MISO levels, bit n for lane n. Called every clock cycle.
     uint32_t pins(bool sync, bool select_n, bool sck, bool mosi)
     {
@@ -106,6 +109,7 @@ class NodeBus
     Levels levels_{false, true, false};
     uint32_t driven_ = UINT32_MAX; // what the nodes drive
     uint32_t miso_ = UINT32_MAX;   // what arrives
+    uint32_t broken_ = 0;          // lanes, a bit each
     LinkFault fault_ = LinkFault::NONE;
     size_t fault_lane_ = 0;
     unsigned fault_bit_ = 0;

@@ -1,5 +1,6 @@
 #include "tick_runner.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 
@@ -53,6 +54,7 @@ void TickRunner::tick(uint64_t number, const sim_field *fields)
     if (plan_) {
         inject_lane_fault(number);
         inject_usb_fault(number);
+        fields = inject_lasting(number, fields);
     }
     silence_dead(number);
     if (number % INTERRUPT_POLL_TICKS == 0) {
@@ -112,6 +114,37 @@ void TickRunner::silence_dead(uint64_t number)
         }
         rig_.bus().spoil_reading(lane, SIM_SENSOR_DEAD, 0);
     }
+}
+
+// Likewise. A cable is broken for the transfers of its records, each a tick later.
+const sim_field *TickRunner::inject_lasting(uint64_t number, const sim_field *fields)
+{
+    uint32_t broken = 0;
+    std::map<size_t, sim_field> frozen;
+    for (const LastingFault &fault : plan_->lasting()) {
+        const bool strikes = number >= fault.tick && number < fault.until;
+        if (fault.kind == LastingKind::LINK_DEAD && number > fault.tick && number <= fault.until) {
+            broken |= 1u << fault.lane;
+        } else if (fault.kind == LastingKind::SENSOR_DEAD && strikes) {
+            rig_.bus().spoil_reading(fault.lane, SIM_SENSOR_DEAD, 0);
+        } else if (fault.kind == LastingKind::SENSOR_FROZEN && strikes) {
+            const auto before = frozen_.find(fault.lane);
+            frozen[fault.lane] = before == frozen_.end() ? fields[fault.lane] : before->second;
+        }
+        if (strikes) {
+            log_.pair(fault.lane, number, fault_name(fault.kind));
+        }
+    }
+    rig_.bus().cut(broken);
+    frozen_.swap(frozen);
+    if (frozen_.empty()) {
+        return fields;
+    }
+    std::copy_n(fields, rig_.bus().populated(), shown_.begin());
+    for (const auto &[lane, field] : frozen_) {
+        shown_[lane] = field;
+    }
+    return shown_.data();
 }
 
 void TickRunner::inject_usb_fault(uint64_t number)

@@ -2,6 +2,7 @@
 // simulation and the bench.
 #pragma once
 
+#include <array>
 #include <map>
 
 #include "fault_log.h"
@@ -43,6 +44,7 @@ class TickRunner
   private:
     void inject_lane_fault(uint64_t number);
     void silence_dead(uint64_t number);
+    const sim_field *inject_lasting(uint64_t number, const sim_field *fields);
     void inject_usb_fault(uint64_t number);
     void start_usb_fault(const UsbFault &fault);
 
@@ -51,6 +53,8 @@ class TickRunner
     std::optional<FaultPlan> plan_;
     FaultLog &log_;
     std::map<size_t, uint64_t> dead_;      // by lane: the tick of its next reading, after a resynchronisation
+    std::map<size_t, sim_field> frozen_;   // by lane: what its sensor goes on to read
+    std::array<sim_field, LANES> shown_{}; // the fields, with those
     std::optional<LaneFault> in_transfer_; // a link fault whose record comes with the next tick's transfer
     uint64_t back_at_ = 0;                 // tick at which a host that stayed away returns
     bool away_ = false;

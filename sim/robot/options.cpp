@@ -186,7 +186,8 @@ std::vector<command_option> all_options()
             set_text<&Options::faults>),
         own("usb-faults", "OUT.csv", "log each USB fault: tick,kind", set_text<&Options::usb_faults>),
         own("fault-list", "FILE",
-            "inject just these: lines 'lane TICK LANE KIND ARGUMENT', 'usb TICK KIND', ticks\nrising",
+            "inject just these: lines 'lane TICK LANE KIND ARGUMENT', 'usb TICK KIND', ticks\nrising, and 'lasting "
+            "TICK UNTIL LANE KIND'",
             set_text<&Options::fault_list>),
         own("nodes", "FILE", "single nodes' traits: lines 'LANE serial N', 'LANE chip ID', 'LANE cut BLOCK'",
             set_text<&Options::nodes>),

@@ -93,7 +93,7 @@ std::optional<FaultPlan> plan_of(const Options &options, const sim_scene &scene)
 {
     if (!options.fault_list.empty()) {
         FaultList list = read_fault_list(options.fault_list, populated(options, scene));
-        return FaultPlan(std::move(list.lane), std::move(list.usb));
+        return FaultPlan(std::move(list.lane), std::move(list.usb), std::move(list.lasting));
     }
     if (options.faults.empty()) {
         return std::nullopt;

@@ -14,7 +14,7 @@ from crunchbot.bridge.ring import FRAME
 from crunchbot.cli import main
 from crunchbot.recording import read
 from crunchbot_lab.simulation.bridge import SimulationError, read_faults
-from whisker_protocol import LIMITS, SENSOR_ERRORS
+from whisker_protocol import CODES, LIMITS, SENSOR_ERRORS, STATUS_CODE_SHIFT
 
 SIX = 0x3F
 FAULTS = """
@@ -31,6 +31,29 @@ error = "field_low"
 [[fault]]
 t_s = 0.4
 kind = "host_away"
+"""
+
+LASTING = """
+[[fault]]
+tick = 50
+until = "end"
+lane = 1
+kind = "sensor_dead"
+[[fault]]
+t_s = 0.02
+until = 300
+lane = 2
+kind = "sensor_frozen"
+[[fault]]
+tick = 300
+until_s = 0.18
+lane = 3
+kind = "link_dead"
+[[fault]]
+tick = 60
+until = 150
+lane = 3
+kind = "link_dead"
 """
 
 
@@ -65,6 +88,41 @@ def test_faults_strike_where_the_file_says(build, tmp_path):
     assert len(frames) == 2000 and (np.diff(frames["sequence"]) == 1).all()
     bad = [(int(frames["tick"][i]), lane) for i, lane in np.argwhere(frames["lane"]["status"][:-1, :6] != 0)]
     assert bad == [(600, 0), (1000, 2)]
+
+
+@pytest.mark.parametrize("level", ["rtl", "bytes"])
+def test_what_lasts_lasts_from_tick_to_tick(build, tmp_path, level):
+    (tmp_path / "faults.toml").write_text(LASTING)
+    options = ["--seconds", 0.2, "--pace", 0, "--level", level, "--fault", tmp_path / "faults.toml"]
+    frames = record(tmp_path, f"whisker-test-lasting-{level}", *options)
+    codes = frames["lane"]["status"] >> STATUS_CODE_SHIFT
+    assert set(codes[50:, 1]) == {CODES["sensor_absent"], CODES["resync"]} and not codes[:50, 1].any()
+    broken = np.r_[60:150, 300:360]
+    assert (codes[broken, 3] == CODES["absent"]).all() and not np.delete(codes[:-1, 3], broken).any()
+    assert not codes[:-1, 2].any()
+    alpha = frames["lane"]["alpha"][:, 2]
+    assert np.ptp(alpha[40:300]) == 0 < np.ptp(alpha[300:-1])
+
+
+def test_doctor_finds_what_lasts(build, capsys, tmp_path):
+    """One entry each: a dead lane, a frozen one and a broken cable, beside good ones."""
+    kinds = {1: "sensor_dead", 2: "sensor_frozen", 3: "link_dead"}
+    text = "".join(f'[[fault]]\ntick = 0\nuntil = "end"\nlane = {n}\nkind = "{kind}"\n' for n, kind in kinds.items())
+    (tmp_path / "faults.toml").write_text(text)
+    words = command(
+        "bridge-sim", "--ring", "whisker-test-doctor", "--level", "bytes", "--fault", tmp_path / "faults.toml"
+    )
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline()
+        main(["doctor", "--ring", "whisker-test-doctor"])
+        process.terminate()
+        assert process.wait(END_S) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if "lane " in line]
+    assert [re.match(r"FAIL  lane (\d): (.{8})", line).groups() for line in said] == [
+        ("1", "100 % ba"),
+        ("2", "frozen: "),
+        ("3", "100 % ba"),
+    ]
 
 
 def test_more_lanes_than_the_scene_has_are_at_rest(build, tmp_path):
@@ -140,6 +198,10 @@ def test_a_port_that_is_taken_is_one_line(build):
         ("[[fault]]\ntick = 1", "fault 1: kind is missing"),
         ("[[fault]]\ntick = 1\nkind = 'x'\ncolour = 2", "fault 1: 'colour' is no key"),
         ("[[fault]]\ntick = 1\nlane = 1\nkind = 'sensor_error'\nerror = 'tired'", "error 'tired' is none; use one of"),
+        ("[[fault]]\ntick = 1\nlane = 1\nkind = 'sensor_frozen'", 'give until, a tick or "end", or until_s'),
+        ("[[fault]]\ntick = 1\nuntil = 1\nlane = 1\nkind = 'link_dead'", "until is not after the fault's beginning"),
+        ("[[fault]]\ntick = 1\nuntil = 'end'\nlane = 1\nkind = 'link_flip'", "link_flip does not last; leave out"),
+        ("[[fault]]\ntick = 1\nuntil = 'end'\nkind = 'link_dead'", "lane is no whole number from 0"),
         ("not TOML", "not TOML ("),
     ],
 )

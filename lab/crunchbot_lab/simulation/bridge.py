@@ -24,6 +24,8 @@ COURSES = {
     "whisk": ((0.6, 0.0), (0.8, WHISK_RAD_S), (1.6, -WHISK_RAD_S), (0.8, WHISK_RAD_S)),
 }
 
+LASTING = ("sensor_dead", "sensor_frozen", "link_dead")  # kinds of faults that may last
+
 
 class SimulationError(UserError):
     """The simulated bridge cannot be started as asked; one line."""
@@ -87,18 +89,39 @@ def _fault(entry: dict, ticks_per_s: int) -> tuple[int, str]:
     """(tick, line) of one fault; ValueError says what is wrong with it."""
     if not isinstance(entry, dict):
         raise ValueError("is no table; write it as [[fault]]")
-    unknown = set(entry) - {"tick", "t_s", "kind", "lane", "bit", "error"}
+    unknown = set(entry) - {"tick", "t_s", "kind", "lane", "bit", "error", "until", "until_s"}
     if unknown:
-        raise ValueError(f"'{min(unknown)}' is no key; use tick or t_s, kind, lane, bit, error")
+        raise ValueError(f"'{min(unknown)}' is no key; use tick or t_s, until or until_s, kind, lane, bit, error")
     if ("tick" in entry) == ("t_s" in entry):
         raise ValueError("give either tick or t_s")
     tick = _number(entry, "tick") if "tick" in entry else round(_number(entry, "t_s", float) * ticks_per_s)
+    lasts = "until" in entry or "until_s" in entry
     kind = entry.get("kind")
     if not isinstance(kind, str) or not kind.isidentifier():
         raise ValueError('kind is missing; give it as in kind = "link_flip"')
+    if lasts or kind == "sensor_frozen":
+        return tick, f"lasting {tick} {_until(entry, tick, ticks_per_s)} {_number(entry, 'lane')} {_lasting(kind)}"
     if "lane" not in entry:
         return tick, f"usb {tick} {kind}"
     return tick, f"lane {tick} {_number(entry, 'lane')} {kind} {_argument(entry)}"
+
+
+def _until(entry: dict, tick: int, ticks_per_s: int) -> int:
+    """The tick of the first record that is well again."""
+    if entry.get("until") == "end":
+        return 2**64 - 1
+    if ("until" in entry) == ("until_s" in entry):
+        raise ValueError('give until, a tick or "end", or until_s')
+    until = _number(entry, "until") if "until" in entry else round(_number(entry, "until_s", float) * ticks_per_s)
+    if until <= tick:
+        raise ValueError("until is not after the fault's beginning; give a later one")
+    return until
+
+
+def _lasting(kind: str) -> str:
+    if kind not in LASTING:
+        raise ValueError(f"{kind} does not last; leave out until, or use one of {', '.join(LASTING)}")
+    return kind
 
 
 def _argument(entry: dict) -> int:
@@ -111,7 +134,7 @@ def _argument(entry: dict) -> int:
 
 
 def _number(entry: dict, key: str, kind: type = int) -> float:
-    value = entry[key]
+    value = entry.get(key)
     if isinstance(value, bool) or not isinstance(value, int | kind) or not 0 <= value < 2**32:
         raise ValueError(f"{key} is no {'whole ' if kind is int else ''}number from 0; give one")
     return value

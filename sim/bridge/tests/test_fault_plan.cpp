@@ -114,12 +114,25 @@ void given_faults_strike_and_no_others(void **)
     }
 }
 
+void what_lasts_may_overlap(void **)
+{
+    const FaultList list =
+        read_text("lasting 5 9 0 sensor_frozen\nlane 7 5 link_flip 63\nlasting 2 18446744073709551615 0 "
+                  "link_dead\n");
+    const FaultPlan plan(list.lane, list.usb, list.lasting);
+    assert_int_equal(plan.lasting().size(), 2);
+    assert_true(plan.lasting()[0].kind == LastingKind::SENSOR_FROZEN && plan.lasting()[0].until == 9);
+    assert_true(plan.lasting()[1].kind == LastingKind::LINK_DEAD && plan.lasting()[1].until == UINT64_MAX);
+}
+
 void wrong_lists_name_line_and_remedy(void **)
 {
     const std::pair<const char *, const char *> wrong[] = {
         {"usb 5 nak_storm\nlane 5 6 link_dead 0\n", "line 2: lane 6 is not populated; give 0 to 5"},
         {"lane 5 0 nak_storm 0\n", "line 1: 'nak_storm' is no such fault; use one of sensor_flip"},
         {"usb 5 bad_data\nusb 5 bad_data\n", "line 2: tick 5 after tick 5; give one fault per tick"},
+        {"lasting 5 9 6 link_dead\n", "line 1: lane 6 is not populated; give 0 to 5"},
+        {"lasting 5 9 0 link_flip\n", "line 1: 'link_flip' is no such fault; use one of sensor_dead, sensor_frozen"},
         {"breakfast\n", "line 1: 'breakfast'; give 'lane TICK"},
     };
     for (const auto &[text, complaint] : wrong) {
@@ -142,6 +155,7 @@ int main()
         cmocka_unit_test(faults_keep_their_distance),
         cmocka_unit_test(the_seed_decides),
         cmocka_unit_test(given_faults_strike_and_no_others),
+        cmocka_unit_test(what_lasts_may_overlap),
         cmocka_unit_test(wrong_lists_name_line_and_remedy),
     };
     return cmocka_run_group_tests(tests, nullptr, nullptr);

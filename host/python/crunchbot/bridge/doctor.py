@@ -13,6 +13,7 @@ import numpy as np
 from whisker_protocol import LANES, WIRE_VERSION
 
 from . import pattern, usbtree
+from .flow import BUSY, CABLE, EVEN, tick_s
 from .ring import DaemonStats, Reader, RingError, error_line, found_rings, user_name
 from .status import explain
 
@@ -26,6 +27,9 @@ RULES = (
 )
 LIBRARIES = {"usb-1.0": "libusb-1.0-0", "hidapi-libusb": "libhidapi-libusb0"}  # as linked: as Debian calls it
 LOOK_S = 0.5  # how long frames are watched
+FROZEN_LEAST = 100  # good samples: noise of one count is one value in so many once in 10^40 looks
+NOISY = 2.0  # times the noise of the calibration: of 1000 samples a standard deviation is known to 3 %
+AXES = ("alpha", "beta")
 PATTERN_FRAMES = 1000  # half a second: every tick's low byte, several times
 ROOM_BYTES = 16 << 20  # of shared memory; a ring of the default size takes 2 MiB
 
@@ -42,13 +46,19 @@ class Finding:
         return f"{self.level:4}  {self.text}" + (f"; {self.remedy}" if self.remedy else "")
 
 
-def examine(ring: str, root: Path = Path("/"), look_s: float = LOOK_S, owner: int | None = None) -> list[Finding]:
-    """All findings, from the cable to the samples. `root` is another only in tests.
+def examine(
+    ring: str,
+    root: Path = Path("/"),
+    look_s: float = LOOK_S,
+    owner: int | None = None,
+    noise: dict[int, np.ndarray] | None = None,
+) -> list[Finding]:
+    """All findings, from the cable to the samples. `root` is another only in tests; `noise`: as `samples` takes it.
 
     Where good frames arrive nothing can have failed before them: the bridge is simulated, say, or replayed.
     """
     before = [*libraries(), *usb(root), *rules(root), *room(root / "dev/shm")]
-    frames = stream(ring, look_s, owner)
+    frames = stream(ring, look_s, owner, noise)
     if not any(finding.level == FAIL for finding in frames):
         before = [replace(finding, level=WARN) if finding.level == FAIL else finding for finding in before]
     return [*before, *frames, *stale_rings(ring)]
@@ -134,13 +144,15 @@ def room(shared: Path) -> list[Finding]:
     return []
 
 
-def stream(ring: str, look_s: float, owner: int | None = None) -> list[Finding]:
+def stream(
+    ring: str, look_s: float, owner: int | None = None, noise: dict[int, np.ndarray] | None = None
+) -> list[Finding]:
     """The ring, its daemon, and the frames in it."""
     try:
         with Reader(ring, owner=owner) as reader:
             out = [Finding(OK, f"ring {ring} of user {reader.owner}: written by process {reader.info.writer_pid}")]
             out += daemon(reader.stats)
-            return out + samples(reader, look_s)
+            return out + samples(reader, look_s, noise)
     except RingError as error:
         return [Finding(FAIL, str(error))]
 
@@ -167,38 +179,70 @@ def daemon(stats: DaemonStats | None) -> list[Finding]:
     return out
 
 
-def samples(reader: Reader, look_s: float) -> list[Finding]:
-    """Whether frames arrive, and what ails their lanes."""
-    frames = _watch(reader, look_s)
+def samples(reader: Reader, look_s: float, noise: dict[int, np.ndarray] | None = None) -> list[Finding]:
+    """Whether frames arrive, and what ails their lanes. `noise`: of (alpha, beta) at rest, by lane, where it is known."""
+    frames, looked_s = _watch(reader, look_s)
     if len(frames) == 0:
-        return [Finding(FAIL, f"no frame in {look_s:g} s", "see the findings above and whiskerd's log")]
-    rate = f"{len(frames)} frames in {look_s:g} s"
+        age_s = _age_s(reader)
+        newest = "" if age_s is None else f", the newest is {age_s:.1f} s old"
+        return [Finding(FAIL, f"no frame in {look_s:g} s{newest}", "see the findings above and whiskerd's log")]
     gaps = np.diff(frames["sequence"])
     lost = int((gaps[gaps < 1 << 31].astype(np.int64) - 1).clip(0).sum())
-    remedy = "free the host's processor; avoid shared USB hubs"
-    out = [Finding(WARN, f"{rate}, {lost} lost", remedy) if lost else Finding(OK, f"{rate}, none lost")]
+    due = looked_s / tick_s(reader.stats)
+    text = f"{len(frames)} frames in {looked_s:.2f} s, {lost or 'none'} lost"
+    if lost:
+        out = [Finding(WARN, text, CABLE if frames["dropped"][0] == frames["dropped"][-1] else BUSY)]
+    elif len(frames) < EVEN * due:
+        pace = f"{due:.0f} are due: the bridge runs at {len(frames) / due:.2f} of real time"
+        out = [Finding(WARN, f"{text}, where {pace}", "a simulated one does so on a busy machine, or by its --pace")]
+    else:
+        out = [Finding(OK, text)]
     mask = int(frames["lane_mask"][-1])
     for lane in (n for n in range(LANES) if mask >> n & 1):
-        status = frames["lane"]["status"][:, lane]
-        counted = Counter(status[status != 0].tolist())
-        if counted:
-            cause, remedy = explain(counted.most_common(1)[0][0])
-            share = 100 * counted.total() / len(frames)
-            out.append(
-                Finding(WARN if share < 50 else FAIL, f"lane {lane}: {share:.3g} % bad samples: {cause}", remedy)
-            )
+        out += _lane(lane, frames["lane"][:, lane], (noise or {}).get(lane))
     return out
 
 
-def _watch(reader: Reader, look_s: float) -> np.ndarray:
+def _lane(lane: int, samples: np.ndarray, noise: np.ndarray | None) -> list[Finding]:
+    good = samples[samples["status"] == 0]
+    counted = Counter(samples["status"][samples["status"] != 0].tolist())
+    out = []
+    if counted:
+        cause, remedy = explain(counted.most_common(1)[0][0])
+        share = 100 * counted.total() / len(samples)
+        out = [Finding(WARN if share < 50 else FAIL, f"lane {lane}: {share:.3g} % bad samples: {cause}", remedy)]
+    if len(good) < FROZEN_LEAST:
+        return out
+    counts = np.column_stack([good["alpha"], good["beta"]]).astype(np.float64)
+    frozen = [axis for axis, values in zip(AXES, counts.T, strict=True) if np.ptp(values) == 0]
+    if frozen:
+        text = f"lane {lane}: frozen: {' and '.join(frozen)} one value in {len(good)} good samples"
+        return [*out, Finding(FAIL, text, "take the node's power away and give it back; else replace its sensor")]
+    now = np.std(np.diff(counts, axis=0), axis=0) / np.sqrt(2)  # of one sample, however slowly the whisker moves
+    if noise is not None and (now > NOISY * noise).any():
+        text = f"lane {lane}: noise {now.max():.1f} counts, {noise[np.argmax(now)]:.1f} when it was calibrated"
+        remedy = "let it stand untouched and look again; check how its magnet sits, then whisker calibrate anew"
+        out.append(Finding(WARN, text, remedy))
+    return out
+
+
+def _age_s(reader: Reader) -> float | None:
+    """Of the newest frame in the ring."""
+    with reader.window(1) as newest:
+        return reader.age_s(int(newest["time_cycles"][-1])) if len(newest) else None
+
+
+def _watch(reader: Reader, look_s: float) -> tuple[np.ndarray, float]:
+    """(new frames, over how many seconds of the wall clock they came)."""
     reader.seek_latest(0)
-    kept, end = [], time.monotonic() + look_s
-    while (left := end - time.monotonic()) > 0:
+    kept, began = [], time.monotonic()
+    while (left := began + look_s - time.monotonic()) > 0:
         frames = reader.take(left)
         if frames is None:
             break
         kept.append(frames)
-    return np.concatenate(kept) if kept else reader.peek()[:0]
+    looked_s = time.monotonic() - began
+    return np.concatenate(kept) if kept else reader.peek()[:0], looked_s
 
 
 def stale_rings(ring: str) -> list[Finding]:

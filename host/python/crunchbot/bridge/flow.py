@@ -47,7 +47,9 @@ class Flow:
         if not missing:
             return None
         by_bridge = "the bridge dropped them, for this machine did not take them in time", BUSY
-        return missing / (frames + missing), *(by_bridge if 2 * dropped > missing else ("they never came over the USB", CABLE))
+        return missing / (frames + missing), *(
+            by_bridge if 2 * dropped > missing else ("they never came over the USB", CABLE)
+        )
 
     def _grown(self) -> np.ndarray:
         """A writer that was started again counts anew."""

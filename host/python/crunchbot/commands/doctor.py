@@ -1,10 +1,12 @@
 """`whisker doctor`: finds out why it does not work (crunchbot.bridge.doctor)."""
 
 import argparse
+from pathlib import Path
 
 from ..arguments import RING, add_ring_owner
 from ..bridge import doctor
 from ..programs import program
+from ..touch.calibration import read_noise
 
 EXAMPLE = "whisker doctor --ring whisker"
 
@@ -15,6 +17,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "prove FPGA, FIFO and USB of a bridge that no whiskerd holds, by its own pattern; no node is needed"
     parser.add_argument("--pattern", action="store_true", help=text)
     parser.add_argument("--serial", metavar="TEXT", help="with --pattern: the bridge with this serial number")
+    text = "rest.toml of 'whisker calibrate': also find lanes that are noisier now, while nothing touches them"
+    parser.add_argument("--rest", type=Path, metavar="FILE", help=text)
     parser.set_defaults(run=run)
 
 
@@ -23,6 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.pattern:
         findings = doctor.prove(program("whiskerd"), arguments.serial)
     else:
-        findings = doctor.examine(arguments.ring, owner=arguments.ring_owner)
+        noise = read_noise(arguments.rest) if arguments.rest else None
+        findings = doctor.examine(arguments.ring, owner=arguments.ring_owner, noise=noise)
     print("\n".join(finding.line() for finding in findings))
     return 1 if any(finding.level == doctor.FAIL for finding in findings) else 0

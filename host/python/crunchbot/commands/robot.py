@@ -55,7 +55,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (default: a day)"
     )
-    text = "simulated seconds per second, at most (%(default)s): a busy machine that loses samples needs less"
+    text = "simulated seconds per second, at most (default: %(default)s); less, where this machine is too busy"
     parser.add_argument("--pace", type=number_above(0.0), default=1.0, metavar="X", help=text)
     text = "write systemd units that start these processes on a real robot into this folder, and start nothing"
     parser.add_argument("--units", type=Path, metavar="DIR", help=text)

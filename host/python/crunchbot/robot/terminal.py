@@ -1,4 +1,4 @@
-"""What a person is told in the terminal while a robot runs: where its page is, what share of its samples is lost, its pace."""
+"""What `whisker robot` says in the terminal while it runs: where its page is, what share of its samples is lost, its pace."""
 
 import re
 import threading

@@ -11,6 +11,7 @@ from whisker_protocol import LANES, LIMITS
 
 from ..bridge.ring import FRAME, Reader
 from ..errors import UserError
+from ..files import UnreadableError, read_toml
 from .contact import ONSET_COUNTS, Contact
 from .texture.spectral import SENSOR_STOPS
 
@@ -116,6 +117,18 @@ def write_rest(path: Path, rests: list[Rest], names: list[str]) -> None:
         lines += ["", "[[lane]]", f"lane = {rest.lane}", f'name = "{names[rest.lane]}"']
         lines += [f"rest = {pairs[0]}", f"noise = {pairs[1]}", f"good = {rest.good}", f"bad = {rest.bad}"]
     path.write_text("\n".join(lines) + "\n")
+
+
+def read_noise(path: Path) -> dict[int, np.ndarray]:
+    """Noise of (alpha, beta) by lane, from a rest.toml. CalibrationError: file, what, remedy."""
+    try:
+        _, content = read_toml(path)
+        lanes = {int(entry["lane"]): np.asarray(entry["noise"], float) for entry in content["lane"]}
+        if any(noise.shape != (2,) or not (noise >= 0.0).all() for noise in lanes.values()):
+            raise ValueError("noise is not two numbers")
+    except (UnreadableError, KeyError, TypeError, ValueError) as error:
+        raise CalibrationError(f"{path}: {error}; give the rest.toml that whisker calibrate wrote") from error
+    return lanes
 
 
 class WhiskFinder:

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,7 @@ from rings import make_frames, ring_name
 from crunchbot.bridge import doctor, pattern, usbtree
 from crunchbot.bridge.ring import FRAME, FoundRing, Reader, Writer
 from crunchbot.errors import UserError
+from crunchbot.touch.calibration import measure_rest, read_noise, write_rest
 
 
 @pytest.fixture
@@ -37,6 +39,13 @@ def host(tmp_path):
 
 def worst(findings):
     return [finding for finding in findings if finding.level == doctor.FAIL]
+
+
+def test_the_calibration_is_read_as_it_was_written(tmp_path):
+    rests = measure_rest(at_rest(2000))
+    write_rest(tmp_path / "rest.toml", rests, ["a", "b", "c"])
+    read = read_noise(tmp_path / "rest.toml")
+    assert sorted(read) == [0, 1, 2] and all(read[r.lane] == pytest.approx(r.noise, abs=0.01) for r in rests)
 
 
 def publish_until(stop, name):
@@ -133,9 +142,71 @@ def test_doctor_looks_at_the_lanes_that_are_in_use_now(masks):
     frames["lane"]["status"] = 0
     frames["lane"]["status"][:, 2] = 33 << 10
     takes = iter([frames, None])
-    reader = SimpleNamespace(seek_latest=lambda back: None, take=lambda wait_s: next(takes))
+    reader = SimpleNamespace(seek_latest=lambda back: None, take=lambda wait_s: next(takes), stats=None)
     reported = any("lane 2:" in finding.text for finding in doctor.samples(reader, PATIENCE_S))
     assert reported == (masks[1] == 0b101)
+
+
+def found_in(frames, monkeypatch, looked_s=0.5, noise=None):
+    """What doctor says of these frames, taken in so long."""
+    monkeypatch.setattr(doctor, "_watch", lambda reader, look_s: (frames, looked_s))
+    return [finding.line() for finding in doctor.samples(SimpleNamespace(stats=None), 0.5, noise)]
+
+
+def at_rest(count=1000):
+    frames = make_frames(count)
+    frames["lane"]["status"] = 0
+    frames["lane_mask"] = 0b111
+    return frames
+
+
+def test_doctor_finds_a_lane_that_repeats_itself(monkeypatch):
+    frames = at_rest()
+    assert len(found_in(frames, monkeypatch)) == 1
+    frames["lane"]["alpha"][:, 1] = 31337
+    assert [line for line in found_in(frames, monkeypatch) if "lane" in line] == [
+        "FAIL  lane 1: frozen: alpha one value in 1000 good samples; take the node's power away and give it back; "
+        "else replace its sensor"
+    ]
+    frames["lane"]["beta"][:, 1] = 32700
+    frames["lane"]["status"][:991, 1] = 33 << 10
+    said = found_in(frames, monkeypatch)
+    assert any("99.1 % bad" in line for line in said) and not any("frozen" in line for line in said)
+
+
+def test_doctor_finds_a_lane_that_is_noisier_than_when_it_was_calibrated(monkeypatch):
+    frames, noise = at_rest(), {lane: np.array([11.0, 11.0]) for lane in range(3)}
+    assert len(found_in(frames, monkeypatch, noise=noise)) == 1
+    frames["lane"]["beta"][:, 2] += (np.arange(1000) % 4000).astype(np.uint16)  # it moves: no noise
+    assert len(found_in(frames, monkeypatch, noise=noise)) == 1
+    frames["lane"]["beta"][:, 2] = np.random.default_rng(3).normal(0x8000, 33, 1000).round()
+    (said,) = [line for line in found_in(frames, monkeypatch, noise=noise) if "lane" in line]
+    assert said.startswith("warn  lane 2: noise 3") and "11.0 when it was calibrated" in said
+
+
+def test_doctor_says_how_many_frames_are_due(monkeypatch):
+    assert found_in(at_rest(), monkeypatch) == ["ok    1000 frames in 0.50 s, none lost"]
+    (said,) = found_in(at_rest(332), monkeypatch)
+    assert said.startswith("warn  332 frames in 0.50 s, none lost, where 1000 are due: the bridge runs at 0.33 of real")
+    frames = np.delete(at_rest(1001), slice(500, 510))
+    assert "991 frames in 0.50 s, 10 lost; check the USB cable" in found_in(frames, monkeypatch)[0]
+    frames["dropped"][500:] = 10
+    assert "991 frames in 0.50 s, 10 lost; end what keeps" in found_in(frames, monkeypatch)[0]
+
+
+def test_doctor_says_how_old_the_newest_frame_is(host):
+    with live_ring(make_frames(10)) as name:
+        (found,) = [f for f in worst(doctor.stream(name, 0.01)) if "no frame" in f.text]
+    age_s = float(found.text.removeprefix("no frame in 0.01 s, the newest is ").removesuffix(" s old"))
+    assert abs(age_s - (time.monotonic() - 1.0)) < PATIENCE_S  # live_ring's clock began 1 s after the machine's
+
+
+@pytest.mark.parametrize("text", ["", "lane = 3", "[[lane]]\nlane = 1\nnoise = [1.0]", "[[lane]]\nlane = 1", "no"])
+def test_a_calibration_that_is_none_is_one_line(capsys, tmp_path, text):
+    path = tmp_path / "rest.toml"
+    path.write_text(text)
+    code, _, err = run(capsys, "doctor", "--rest", path)
+    assert code == 1 and err.count("\n") == 1 and str(path) in err and "that whisker calibrate wrote" in err
 
 
 def test_doctor_asks_for_permission_and_rule(host, monkeypatch):

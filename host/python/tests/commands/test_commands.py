@@ -231,7 +231,9 @@ def test_top_draws_in_a_terminal_and_leaves_it_as_it_was():
         os.close(ours)
     text = seen.decode()
     assert text.startswith("\x1b[?1049h\x1b[?25l") and text.rstrip().endswith("\x1b[?25h\x1b[?1049l")
-    assert "0.0 frames/s" in text and "no frame for" in text and "27 lane27" in text and "bridge B0042 connected" in text
+    assert (
+        "0.0 frames/s" in text and "no frame for" in text and "27 lane27" in text and "bridge B0042 connected" in text
+    )
     assert any(bar in text for bar in BARS)
 
 
@@ -259,7 +261,9 @@ def test_a_ring_says_what_share_is_lost_and_why():
         clock.now = 0.1 * step
         flow.add(100 + 100 * step, 50 + 25 * step, 20 * step)
     share, why, remedy = flow.loss()
-    assert (share, flow.rate()) == (0.2, pytest.approx(1000.0)) and "the bridge dropped them" in why and "--pace" in remedy
+    assert (
+        (share, flow.rate()) == (0.2, pytest.approx(1000.0)) and "the bridge dropped them" in why and "--pace" in remedy
+    )
     flow.add(1200, 900, 200)
     assert "never came over the USB" in flow.loss()[1]
     for step in range(11, 35):
