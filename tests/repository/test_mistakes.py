@@ -46,7 +46,7 @@ MISTAKES = {
     "whisker scene make --family anchor+nap --seed 1 --out s": ("no modifier 'nap'", "the names are global, "),
     "whisker scene make --family anchor --seed -1 --out s": ("--seed or --steps is too small", "give 0 or more"),
     "whisker scene from nosuch --out s": ("no recording with observation rows", "give the folder of a run"),
-    "whisker scene from examples/drive.mcap --out s": ("holds no arena.toml", "give a bag of a robot"),
+    "whisker scene from examples/drive.mcap --out s": ("of no robot", "for ordinary topics give --topics"),
     "whisker scene map examples/scene examples/home.pgm --out s": ("not a text file", "give a map server's YAML"),
     "whisker info --ring nosuch": ("there is no ring of this name", "start whiskerd with this --ring"),
     "whisker record": ("required: FILE.MCAP", "see 'whisker record --help'"),

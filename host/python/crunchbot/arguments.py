@@ -102,6 +102,12 @@ def add_ring_owner(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ring-owner", type=user, metavar="USER", help=text)
 
 
+def add_topics(parser: argparse.ArgumentParser) -> None:
+    """--topics, for commands that read a robot's bag."""
+    text = "table of which topic is which column, for a bag of ordinary topics (docs/formats.md); needs --scene"
+    parser.add_argument("--topics", type=Path, metavar="TABLE.toml", help=text)
+
+
 def add_zenoh_config(parser: argparse.ArgumentParser, endpoints: str = "are those given here") -> None:
     """--zenoh-config, for commands on the robot's network. `endpoints`: what becomes of theirs."""
     text = f"zenoh's own configuration (JSON5): TLS and access control, see docs/remote.md; endpoints {endpoints}"

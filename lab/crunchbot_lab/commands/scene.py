@@ -2,7 +2,7 @@
 
 import argparse
 
-from crunchbot.arguments import add_action, warn
+from crunchbot.arguments import add_action, add_topics, warn
 from crunchbot.nav.filters import SettingError
 from crunchbot.nav.observations import observations_path, read_observations
 from crunchbot.scene import OBSTACLES_MOST, SceneError, load, write
@@ -29,7 +29,12 @@ def add(parser: argparse.ArgumentParser) -> None:
         default="",
         help=f"of the recording: {', '.join(scenes.READERS)} (default: found from its files)",
     )
-    p.add_argument("recording", help="folder that a run left, as build/demo, a robot's bag, or a Thymio's recording")
+    text = (
+        "folder that a run left, as build/demo; a robot's bag, or one that 'ros2 bag record' made; a Thymio's recording"
+    )
+    p.add_argument("recording", help=text)
+    p.add_argument("--scene", metavar="SCENE", help="arena, robot and prior of a bag: those that it lacks, or others")
+    add_topics(p)
     p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
     example = "whisker scene map examples/scene examples/home.yaml --out scenes/mapped"
     text = "put an occupancy map into a scene folder, for all commands that take one"
@@ -57,7 +62,8 @@ def make(arguments: argparse.Namespace) -> int:
 def from_recording(arguments: argparse.Namespace) -> int:
     if arguments.kind not in ("", *scenes.READERS):
         raise SettingError(f"scene from: kind '{arguments.kind}' is unknown; choose one of {', '.join(scenes.READERS)}")
-    scene, observations = scenes.read_recording(arguments.recording, warn, arguments.kind)
+    given = (arguments.scene, arguments.topics)
+    scene, observations = scenes.read_recording(arguments.recording, warn, arguments.kind, *given)
     _write(arguments.out, scene, observations)
     print(f"{arguments.out}: from {arguments.recording}, {len(observations)} rows")
     return 0

@@ -2,61 +2,50 @@
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from crunchbot.errors import UserError
 from crunchbot.nav.observations import Observations, observations_path, read_observations
 from crunchbot.observation import TIME, TRUTH, Quantity, Row, cell
-from crunchbot.recording.mcapfile import McapFile, RecordingError
+from crunchbot.recording.mcapfile import RecordingError
+from crunchbot.recording.rosbag import open_bag
 from crunchbot.robot.network.inbox import Received
-from crunchbot.robot.network.messages import MessageError, Observation, PoseStamped, decode
+from crunchbot.robot.network.messages import Observation, PoseStamped
 from crunchbot.robot.network.rows import Follower, time_text
 from crunchbot.robot.network.streams import Envelope
-from crunchbot.robot.played import RECORD, SCENE_FILES
-from crunchbot.scene import Scene, load
-
-
-class BagError(UserError):
-    """A bag that no scene can be made from; one line."""
+from crunchbot.robot.played import BagError
+from crunchbot.robot.played import read_bag as played_bag
+from crunchbot.robot.topic_rows import read_by_table
+from crunchbot.scene import ARENA, Scene, load
 
 
 def is_bag(path: Path) -> bool:
-    """Whether there is anything of a bag in a file."""
+    """Whether there is anything of a bag in a file or folder."""
     try:
-        with McapFile(path):
+        with open_bag(path):
             return True
     except RecordingError:
         return False
 
 
-def read_bag(path: Path, warn: Callable[[str], None]) -> tuple[Scene, Observations]:
-    """(scene, rows) of a bag, each damage asked to `warn`; BagError when it holds none."""
-    with McapFile(path) as bag:
-        reported = bag.metadata.get(RECORD, {})
-        robot = reported.get("robot", "")
-        wanted = {f"/{robot}/observation": Observation, f"/{robot}/truth": PoseStamped}
-        found = {topic: [] for topic in wanted}
-        for message in bag.messages():
-            if message.topic in wanted:
-                found[message.topic] += _decoded(bag, wanted[message.topic], message)
-        for line in bag.damage:
-            warn(line)
-    rows, truth = found.values()
-    missing = [name for name in SCENE_FILES[:2] if name not in reported]
-    if missing or not rows:
-        what = f"holds no {missing[0]}" if missing else "holds no observations"
-        raise BagError(f"{path}: {what}; give a bag of a robot that 'whisker bag --scene SCENE' made")
-    return _as_folder({name: reported[name] for name in SCENE_FILES if name in reported}, rows, truth)
-
-
-def _decoded(bag: McapFile, kind: type, message) -> list:
-    try:
-        return [decode(kind, bytes(message.data), message.topic)]
-    except MessageError as error:
-        bag.note(f"{error}; left out")
-        return []
+def read_bag(
+    path: Path, warn: Callable[[str], None], given: str | None, table: Path | None
+) -> tuple[Scene, Observations]:
+    """(scene, rows) of a bag, each damage asked to `warn`; the scene is the folder `given`, or the bag's. `table`: of its
+    topics, if they are ordinary ones. BagError when it holds none."""
+    scene = load(given) if given else None
+    played = read_by_table(path, table, scene) if table else played_bag(path, ("observation", "truth"))
+    for line in played.damage:
+        warn(line)
+    rows, truth = ([said.message for said in played.said if said.topic == name] for name in ("observation", "truth"))
+    scene = scene or played.scene
+    if scene is None or not rows:
+        what = "observations; give another bag" if scene else f"{ARENA}; give the robot's scene with --scene"
+        raise BagError(f"{path}: holds no {what}")
+    robot = replace(scene.robot, sensors=tuple(s for s in scene.robot.sensors if s.name in rows[0].names))
+    return _with_rows(replace(scene, robot=robot), _table(scene, rows, truth))
 
 
 def _table(scene: Scene, rows: list[Observation], truth: list[PoseStamped]) -> list[dict[str, str]]:
@@ -83,13 +72,9 @@ def _cells(row: Row, poses: dict[int, tuple], stamp_ns: int | None) -> dict[str,
     return cells
 
 
-def _as_folder(files: dict[str, str], observations: list[Observation], truth: list[PoseStamped]):
-    """Read as a scene folder is read, with all its checks."""
+def _with_rows(scene: Scene, rows: list[dict[str, str]]) -> tuple[Scene, Observations]:
+    """Read as a scene folder's are read, with all checks."""
     with tempfile.TemporaryDirectory(prefix="whisker-") as place:
-        for name, text in files.items():
-            (Path(place) / name).write_text(text)
-        scene = load(place)
-        rows = _table(scene, observations, truth)
         lines = [",".join(rows[0]), *(",".join(row.values()) for row in rows)]
         observations_path(place).write_text("\n".join(lines) + "\n")
         return scene, read_observations(observations_path(place), scene)

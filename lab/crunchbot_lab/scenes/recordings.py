@@ -22,13 +22,21 @@ class RecordingKindError(UserError):
 Warn = Callable[[str], None]
 
 
-def read_recording(path: str | Path, warn: Warn = lambda line: None, kind: str = "") -> tuple[Scene, Observations]:
+def read_recording(
+    path: str | Path,
+    warn: Warn = lambda line: None,
+    kind: str = "",
+    scene: str | None = None,
+    topics: Path | None = None,
+) -> tuple[Scene, Observations]:
     """The scene a recording was made in and its rows; a start that the recording does not hold is uniform.
 
-    `kind`: the one of READERS that it must be; empty: any. `warn` takes a line for each damage that cost rows or may have. RecordingKindError for what no reader knows;
+    `kind`: the one of READERS that it must be; empty: any. `scene`, `topics`: of a bag, as read_bag has them. `warn` takes a line for each damage that cost rows or may have. RecordingKindError for what no reader knows;
     SceneError and TableError for a recording whose files are broken.
     """
     path = Path(path)
+    if scene or topics:
+        return _with_prior(*read_bag(path, warn, scene, topics))
     for knows, read in [READERS[kind]] if kind else READERS.values():
         if knows(path):
             return read(path, warn)
@@ -46,7 +54,7 @@ def _read_folder(folder: Path, warn: Warn) -> tuple[Scene, Observations]:
 
 
 def _read_bag(path: Path, warn: Warn) -> tuple[Scene, Observations]:
-    return _with_prior(*read_bag(path, warn))
+    return _with_prior(*read_bag(path, warn, None, None))
 
 
 def _with_prior(scene: Scene, rows: Observations) -> tuple[Scene, Observations]:

@@ -9,9 +9,10 @@ import sys
 import webbrowser
 from pathlib import Path
 
-from ..arguments import add_ring_owner, add_zenoh_config
+from ..arguments import add_ring_owner, add_topics, add_zenoh_config
 from ..errors import UserError
 from ..robot.played import read_bag
+from ..robot.topic_rows import read_by_table
 from ..scene import load
 from ..stopping import listen
 from .hub import Hub
@@ -34,8 +35,9 @@ class PlaybackError(UserError):
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments and set `run`."""
-    text = "a robot's bag to play, in place of what runs now: of 'whisker bag' or 'whisker robot'"
-    parser.add_argument("file", nargs="?", type=Path, metavar="FILE.mcap", help=text)
+    text = "a robot's bag to play, in place of what runs now: of 'whisker bag', 'whisker robot' or 'ros2 bag record'"
+    parser.add_argument("file", nargs="?", type=Path, metavar="BAG", help=text)
+    add_topics(parser)
     parser.add_argument(
         "--ring", action="append", metavar="NAME", help=f"a ring to read from the start; repeatable (default: {RING})"
     )
@@ -101,7 +103,9 @@ def run(arguments: argparse.Namespace, part: str = "") -> int:
     may_set_pose = arguments.allow_pose or ipaddress.ip_address(arguments.host).is_loopback
     source = _source(arguments)
     if arguments.file:
-        played = read_bag(arguments.file, [topic.removesuffix("/*") for topic in WANTED])
+        wanted = [topic.removesuffix("/*") for topic in WANTED]
+        table = arguments.topics
+        played = read_by_table(arguments.file, table, scene) if table else read_bag(arguments.file, wanted)
         source, scene = Playback(played), scene or played.scene
     try:
         return asyncio.run(_serve(arguments, Hub(rings, source, scene, arguments.ring_owner, may_set_pose), part))
@@ -117,6 +121,8 @@ def _source(arguments: argparse.Namespace) -> NoRobot:
             text = "a recording is played without --ring, --robot, --connect and --zenoh-config"
             raise PlaybackError(f"{arguments.file}: {text}")
         return NoRobot()
+    if arguments.topics:
+        raise PlaybackError("--topics: no bag to read by it; name one")
     asked = arguments.robot or arguments.scene or arguments.connect or config
     return join(arguments.robot or ROBOT, arguments.connect, config) if asked else NoRobot()
 

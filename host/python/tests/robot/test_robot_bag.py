@@ -196,7 +196,9 @@ def test_a_pilot_that_began_anew_goes_on_in_the_scene(scene, tmp_path, capsys):
 def test_bags_that_no_scene_can_be_made_from(scene, tmp_path, capsys):
     TopicWriter(tmp_path / "empty.mcap", RECORD, {"robot": "robot"}).finish()
     code, _, err = run(capsys, "scene", "from", tmp_path / "empty.mcap", "--out", tmp_path / "x")
-    assert code == 2 and err.startswith(f"whisker: {tmp_path}/empty.mcap: holds no arena.toml; give a bag of a robot")
+    assert code == 2 and err.startswith(
+        f"whisker: {tmp_path}/empty.mcap: nothing that the robot said can be read; give another"
+    )
     (tmp_path / "no.mcap").write_text("nothing")
     code, _, err = run(capsys, "scene", "from", tmp_path / "no.mcap", "--out", tmp_path / "x")
     assert code == 2 and "no recording with observation rows" in err

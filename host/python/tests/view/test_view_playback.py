@@ -160,7 +160,8 @@ def test_the_page_plays_pauses_and_goes_where_one_points(bag, theme, size):
 
 
 @pytest.mark.parametrize(
-    ("words", "wanted"), [([], "holds no robot; give a bag"), (["--robot"], "played without --ring, --robot")]
+    ("words", "wanted"),
+    [([], "rows (/NAME/observation) of no robot; give a bag of one"), (["--robot"], "played without --ring, --robot")],
 )
 def test_what_cannot_be_played_is_one_line(bag, tmp_path, capsys, words, wanted):
     with TopicWriter(tmp_path / "other.mcap", "whisker", {}, False) as writer:

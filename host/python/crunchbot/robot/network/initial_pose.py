@@ -12,7 +12,7 @@ import numpy as np
 
 from ...scene import Prior, Scene, independent
 from .messages import Header, PoseWithCovariance, PoseWithCovarianceStamped
-from .ros import MAP_FRAME
+from .ros import MAP_FRAME, heading_of
 
 if TYPE_CHECKING:
     from .link import Link
@@ -55,7 +55,7 @@ def prior_of(message: PoseWithCovarianceStamped, scene: Scene) -> Prior:
     if message.header.frame_id not in ("", MAP_FRAME):
         raise InitialPoseError(f"frame '{message.header.frame_id}'; give a pose in frame '{MAP_FRAME}'")
     turn = message.pose.pose.orientation
-    if not turn.z**2 + turn.w**2 > turn.x**2 + turn.y**2:
+    if heading_of(turn) is None:
         reported = ", ".join(f"{value:.3g}" for value in (turn.x, turn.y, turn.z, turn.w))
         raise InitialPoseError(
             f"orientation ({reported}) has no heading; give z = sin(heading / 2), w = cos(heading / 2)"

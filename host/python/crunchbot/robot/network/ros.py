@@ -78,6 +78,13 @@ class Pose:
         return self.position.x, self.position.y, math.remainder(2.0 * math.atan2(q.z, q.w), math.tau)
 
 
+def heading_of(turn: Quaternion) -> float | None:
+    """rad, -pi to pi; None: it is no rotation (all zeros, say), or lays the robot on its side."""
+    if not turn.z**2 + turn.w**2 > turn.x**2 + turn.y**2:
+        return None
+    return math.remainder(2.0 * math.atan2(turn.z, turn.w), math.tau)
+
+
 PLANAR = np.ix_([0, 1, 5], [0, 1, 5])  # x, y and rotation about z among the six of a ROS covariance
 
 
