@@ -42,6 +42,15 @@ cmd:simavr simavr
 LIST
 }
 
+# Without what Debian recommends beside them: a C library for ARM, compilers for npm.
+wanted_bare() {
+    cat <<'LIST'
+cmd:arm-none-eabi-gcc gcc-arm-none-eabi
+cmd:node nodejs
+cmd:npm npm
+LIST
+}
+
 wanted() {
     wanted_to_build
     [ "$for_what" != --tests ] || wanted_to_test
@@ -57,17 +66,22 @@ present() {
     esac
 }
 
-missing=$(wanted | while read -r what package; do present "$what" || printf '%s ' "$package"; done)
-if [ -n "$missing" ]; then
-    echo "setup: installing Debian packages: $missing"
+of_missing() { while read -r what package; do present "$what" || printf '%s ' "$package"; done; }
+missing=$(wanted | of_missing)
+bare=
+[ "$for_what" != --tests ] || bare=$(wanted_bare | of_missing)
+if [ -n "$missing$bare" ]; then
+    echo "setup: installing Debian packages: $missing$bare"
     sudo=
     if [ "$(id -u)" -ne 0 ]; then
-        command -v sudo >/dev/null 2>&1 || { echo "setup: cannot install packages; as root run: apt-get install $missing" >&2; exit 1; }
+        command -v sudo >/dev/null 2>&1 || { echo "setup: cannot install packages; as root run: apt-get install $missing$bare" >&2; exit 1; }
         sudo=sudo
     fi
-    if ! { $sudo apt-get update -qq && $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $missing; } >build-packages.log 2>&1; then
+    install() { [ $# = 0 ] || $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq "$@"; }
+    # shellcheck disable=SC2086
+    if ! { $sudo apt-get update -qq && install $missing && install ${bare:+--no-install-recommends $bare}; } >build-packages.log 2>&1; then
         tail -3 build-packages.log >&2
-        echo "setup: package installation failed; check the package mirror, then run: apt-get install $missing" >&2
+        echo "setup: package installation failed; check the package mirror, then run: apt-get install $missing$bare" >&2
         exit 1
     fi
     # What was configured without them is configured again.
@@ -104,4 +118,10 @@ if ! cat pyproject.toml lab/pyproject.toml | cmp -s - "$stamp"; then
     .venv/bin/pip install --quiet --disable-pip-version-check --no-compile --no-deps --no-build-isolation --editable . --editable lab ||
         { echo "setup: the packages of this tree could not be installed into .venv; delete .venv and run make again" >&2; exit 1; }
     cat pyproject.toml lab/pyproject.toml >"$stamp"
+fi
+# The emulator of the Pico, by its lock.
+if [ "$for_what" = --tests ] && ! cmp -s sim/pico/package-lock.json sim/pico/node_modules/.lock; then
+    npm ci --silent --ignore-scripts --no-audit --no-fund --prefix sim/pico ||
+        { echo "setup: the emulator of the Pico could not be installed; check the npm registry, then run make again" >&2; exit 1; }
+    cp sim/pico/package-lock.json sim/pico/node_modules/.lock
 fi

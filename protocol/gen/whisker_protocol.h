@@ -189,6 +189,8 @@
 #define WHISKER_CODE_ANSWER 11u /* no reading: a node's answer to a service order */
 #define WHISKER_CODE_LOADER 12u /* the boot loader runs: there is no valid application, or an update is under way */
 #define WHISKER_CODE_OVERRUN 13u /* a byte of the sensor was lost within the node (SPI overflow) */
+#define WHISKER_CODE_MAGNET 14u /* the field is too weak for an angle: the magnet is lost or far off */
+#define WHISKER_CODE_SENSOR_UNKNOWN 15u /* the chip on this lane answers, and is none that the firmware knows */
 #define WHISKER_CODE_ABSENT 32u /* nothing answers on this lane: all ones */
 #define WHISKER_CODE_LINK_CRC 33u /* the record's CRC is wrong */
 #define WHISKER_CODE_LINK_TICK 34u /* the record belongs to another tick: stale or slipped */
@@ -249,10 +251,12 @@
 #define WHISKER_BOARD_ULX3S 5u /* ULX3S */
 #define WHISKER_BOARD_COLORLIGHT_I5 6u /* Colorlight i5 on its extension board */
 #define WHISKER_BOARD_ORANGECRAB 7u /* OrangeCrab */
+#define WHISKER_BOARD_PICO 8u /* Raspberry Pi Pico: bridge and nodes in one */
 #define WHISKER_FLASH_COMMAND_IDENTIFY 0u /* the first three bytes of data become the chip's JEDEC identity */
 #define WHISKER_FLASH_COMMAND_READ 1u /* data becomes the 32 bytes at the address */
 #define WHISKER_FLASH_COMMAND_ERASE 2u /* the 4096 bytes around the address become 0xFF */
 #define WHISKER_FLASH_COMMAND_PROGRAM 3u /* the bits of data that are 0 become 0 at the address */
+#define WHISKER_FLASH_COMMAND_BOOT 4u /* of the Pico, while no run is in progress: it begins anew as a drive that takes firmware. Others refuse it */
 #define WHISKER_HEALTH_COUNT 16u
 #define WHISKER_CRC8_POLYNOMIAL 47u
 #define WHISKER_CRC8_INIT 255u
@@ -279,6 +283,8 @@
     X(ANSWER, 11, "no reading: a node's answer to a service order", "none") \
     X(LOADER, 12, "the boot loader runs: there is no valid application, or an update is under way", "load the firmware: whisker flash") \
     X(OVERRUN, 13, "a byte of the sensor was lost within the node (SPI overflow)", "none if rare; else check the supply's decoupling") \
+    X(MAGNET, 14, "the field is too weak for an angle: the magnet is lost or far off", "check that the magnet is still in its plug; move it towards the sensor") \
+    X(SENSOR_UNKNOWN, 15, "the chip on this lane answers, and is none that the firmware knows", "check chip and wiring of this lane") \
     X(ABSENT, 32, "nothing answers on this lane: all ones", "connect a node or take the lane out of the lane mask") \
     X(LINK_CRC, 33, "the record's CRC is wrong", "check the lane's cable; lower the SPI clock") \
     X(LINK_TICK, 34, "the record belongs to another tick: stale or slipped", "check the SYNC and select lines of this lane") \

@@ -1,0 +1,26 @@
+#include "memory.h"
+
+#include <stdint.h>
+
+void *memset(void *to, int value, size_t n)
+{
+    uint8_t *at = to;
+    if (((uintptr_t)to & 3u) == 0)
+        for (; n >= 4; n -= 4, at += 4)
+            *(uint32_t *)(void *)at = 0x01010101u * (uint8_t)value;
+    while (n-- > 0)
+        *at++ = (uint8_t)value;
+    return to;
+}
+
+void *memcpy(void *restrict to, const void *restrict from, size_t n)
+{
+    uint8_t *at = to;
+    const uint8_t *source = from;
+    if ((((uintptr_t)to | (uintptr_t)from) & 3u) == 0) /* records, packets */
+        for (; n >= 4; n -= 4, at += 4, source += 4)
+            *(uint32_t *)(void *)at = *(const uint32_t *)(const void *)source;
+    while (n-- > 0)
+        *at++ = *source++;
+    return to;
+}
