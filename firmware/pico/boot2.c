@@ -1,6 +1,7 @@
 /* Boot stage 2: what the chip's ROM copies from the first 256 bytes of flash into RAM, checks and runs. It makes the
  * flash readable in the slowest way that every chip knows, copies the program into RAM and enters it: nothing runs from
- * flash afterwards, so its wait states and the cache change no time. tools/firmware/pico_image.py adds the CRC the ROM wants.
+ * flash afterwards, so its wait states and the cache change no time. tools/firmware/pico_image.py adds the CRC the ROM
+ * wants.
  */
 #include "rp2040.h"
 
