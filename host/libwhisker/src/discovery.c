@@ -92,6 +92,17 @@ static int discovery_more_reporting(int before, int now)
     return before == WHISKER_ERROR_DEVICE_MISSING || before == WHISKER_ERROR_DEVICE_SERIAL ? now : before;
 }
 
+/* How many bridges say this serial number, as far as they may be asked. */
+static int discovery_count(libusb_device *const *all, ssize_t count, const struct usb_identity *identity,
+                           const char *serial)
+{
+    int found = 0;
+    for (ssize_t i = 0; i < count; i++) {
+        found += usb_is_bridge(all[i], identity) && strcmp(discovery_describe(all[i]).serial, serial) == 0;
+    }
+    return found;
+}
+
 int discovery_open(libusb_context *usb, const char *serial, libusb_device_handle **handle,
                    struct whisker_device_info *about)
 {
@@ -106,8 +117,9 @@ int discovery_open(libusb_context *usb, const char *serial, libusb_device_handle
     if (count < 0) {
         return usb_error((int)count);
     }
-    int error = WHISKER_ERROR_DEVICE_MISSING;
-    for (ssize_t i = 0; i < count && !*handle; i++) {
+    const bool is_told_apart = !serial || discovery_count(all, count, &identity, serial) < 2;
+    int error = is_told_apart ? WHISKER_ERROR_DEVICE_MISSING : WHISKER_ERROR_DEVICE_TWINS;
+    for (ssize_t i = 0; i < count && !*handle && is_told_apart; i++) {
         if (usb_is_bridge(all[i], &identity)) {
             error = discovery_more_reporting(error, discovery_try_open(all[i], serial, handle, about));
         }

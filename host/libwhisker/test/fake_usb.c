@@ -136,7 +136,7 @@ libusb_device *libusb_get_device(libusb_device_handle *handle)
 
 int libusb_get_string_descriptor_ascii(libusb_device_handle *handle, uint8_t index, unsigned char *text, int room)
 {
-    const char serial[] = {'0', '0', '0', (char)('1' + ((char *)handle - bus)), '\0'};
+    const char serial[] = {'0', '0', '0', (char)('1' + (fake.twins ? 0 : (char *)handle - bus)), '\0'};
     if (index != SERIAL_INDEX || room < (int)sizeof serial) {
         return LIBUSB_ERROR_INVALID_PARAM;
     }

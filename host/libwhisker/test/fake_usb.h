@@ -14,6 +14,7 @@ struct fake_usb {
     bool plugged, hid_refuses;
     bool gone;   /* unplugged while it was open: control transfers say so */
     int bridges; /* plugged in; their serial numbers are "0001", "0002", ... */
+    bool twins;  /* all are "0001" */
     bool has_hid;
     int open_error, claim_error;
     uint16_t vendor, product; /* in its descriptor; 0: the protocol's */

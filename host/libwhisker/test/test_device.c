@@ -139,6 +139,20 @@ static void the_bridge_asked_for_is_opened(void **state)
     assert_int_equal(fake.opened, 0);
 }
 
+static void bridges_of_one_serial_number_are_refused(void **state)
+{
+    (void)state;
+    struct whisker_identity identity;
+    fake.bridges = 2;
+    fake.twins = true;
+    assert_int_equal(whisker_device_open("0001", &device, &identity), WHISKER_ERROR_DEVICE_TWINS);
+    assert_int_equal(fake.opened, 0);
+    assert_int_equal(whisker_device_open("0002", &device, &identity), WHISKER_ERROR_DEVICE_SERIAL);
+    fake.bridges = 1;
+    assert_int_equal(whisker_device_open("0001", &device, &identity), 0);
+    close_and_check();
+}
+
 static void bridges_are_listed_also_without_permission(void **state)
 {
     (void)state;
@@ -459,6 +473,7 @@ int main(void)
         WITH_BRIDGE(another_wire_version_or_shape_is_refused_and_named),
         WITH_BRIDGE(a_bridge_with_other_numbers_is_found_by_them),
         WITH_BRIDGE(the_bridge_asked_for_is_opened),
+        WITH_BRIDGE(bridges_of_one_serial_number_are_refused),
         WITH_BRIDGE(bridges_are_listed_also_without_permission),
         WITH_BRIDGE(hidapi_ends_with_its_last_handle),
         WITH_BRIDGE(arrivals_are_reported_by_event_and_by_looking),

@@ -59,14 +59,14 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    stop = stop_on_signals()
+    stop, over = stop_on_signals(), threading.Event()
     with tempfile.TemporaryDirectory(prefix="whisker-") as folder:
         command = _command(arguments, Path(folder))
         pipes = {"stderr": subprocess.PIPE, "stdout": None if arguments.usbip is None else subprocess.PIPE}
         with subprocess.Popen(command, text=True, start_new_session=True, **pipes) as process:
             watcher = threading.Thread(target=_relay, args=(process,), daemon=True)
             watcher.start()
-            course = Course(Path(folder) / "sim.sock", arguments.drive, arguments.pace, stop)
+            course = Course(Path(folder) / "sim.sock", arguments.drive, arguments.pace, over)  # it drives until the end
             course.start()
             if arguments.usbip is None:
                 _await_ring(arguments.ring, process, stop)
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
             if stopped:
                 process.send_signal(signal.SIGTERM)
             process.wait()
-            stop.set()
+            over.set()
             course.join()
             watcher.join()
     return 0 if stopped else process.returncode

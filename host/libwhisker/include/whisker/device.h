@@ -96,8 +96,8 @@ int whisker_device_list(struct whisker_device_info *list, int room);
 
 /*
  * Opens a bridge and asks who it is. serial: which one; NULL: the first that can be opened. Returns 0 and the device,
- * or DEVICE_MISSING, DEVICE_SERIAL, DEVICE_ACCESS, DEVICE_BUSY, DEVICE_USB, DEVICE_GONE, DEVICE_CONTROL, WIRE_VERSION,
- * DEVICE_IDENTITY, MEMORY; then *device is NULL.
+ * or DEVICE_MISSING, DEVICE_SERIAL, DEVICE_TWINS, DEVICE_ACCESS, DEVICE_BUSY, DEVICE_USB, DEVICE_GONE, DEVICE_CONTROL,
+ * WIRE_VERSION, DEVICE_IDENTITY, MEMORY; then *device is NULL.
  * identity: filled in also with WIRE_VERSION and DEVICE_IDENTITY, so that a message can name both sides.
  */
 int whisker_device_open(const char *serial, struct whisker_device **device, struct whisker_identity *identity);

@@ -9,7 +9,7 @@
 #define WHISKER_ERRORS(X)                                                                                              \
     X(ARGUMENT, -1, "an argument is outside its range", "see the comment of the function")                             \
     X(MEMORY, -2, "not enough memory", "free some memory, or ask for a smaller ring")                                  \
-    X(SYSTEM, -3, "the operating system refused", "see errno")                                                         \
+    X(SYSTEM, -3, "the operating system refused", "errno says why; whisker doctor looks for the cause")                \
     X(TRUNCATED, -10, "a frame is incomplete", "read on: the rest may come; check the USB cable")                      \
     X(MAGIC, -11, "a frame does not begin with its magic", "resynchronise on the next magic; check the USB cable")     \
     X(WIRE_VERSION, -12, "bridge and host speak different wire versions", "install gateware and host of one release")  \
@@ -35,6 +35,8 @@
       "name that user with --ring-owner, or choose another --ring")                                                    \
     X(RING_WRITER, -33, "the process that this ring names as its writer does not hold the ring",                       \
       "its writer may run in another container: stop it there, or choose another --ring")                              \
+    X(RING_SHARED, -34, "the shared memory for rings is missing or cannot be written",                                 \
+      "mount a tmpfs at /dev/shm that can be written")                                                                 \
     X(DEVICE_MISSING, -40, "no bridge is connected", "plug it in; check its power and cable")                          \
     X(DEVICE_ACCESS, -41, "no permission to open the bridge", "install the udev rule, or ask an administrator")        \
     X(DEVICE_BUSY, -42, "another process uses the bridge", "stop the other whiskerd")                                  \
@@ -46,6 +48,8 @@
       "install gateware and host of one release")                                                                      \
     X(DEVICE_DRAIN, -48, "the bridge did not send its last frame after a stop", "plug the bridge in again")            \
     X(DEVICE_SERIAL, -49, "no bridge of this serial number is connected", "see whiskerd --list for those there are")   \
+    X(DEVICE_TWINS, -56, "several bridges have this serial number",                                                    \
+      "unplug all but one; give each its own: make bitstream BOARD=... SERIAL=...")                                    \
     X(TICK_IN_SILENT, -52, "no edge comes at the bridge's pin tick_in, so there are no ticks",                         \
       "check the wire and that its source runs; or start without --tick-in")                                           \
     X(TICK_IN_FAST, -53, "edges come at tick_in less than 7/8 of the tick period after the last: they are left out",   \

@@ -92,7 +92,8 @@ int ring_file_make(const char *directory, size_t bytes, int *fd)
 {
     *fd = open(directory, O_TMPFILE | O_RDWR | O_CLOEXEC, READABLE_BY_ALL);
     if (*fd < 0) {
-        return WHISKER_ERROR_SYSTEM;
+        const bool is_shut = errno == EROFS || errno == ENOENT || errno == EACCES || errno == EOPNOTSUPP;
+        return is_shut ? WHISKER_ERROR_RING_SHARED : WHISKER_ERROR_SYSTEM;
     }
     if (posix_fallocate(*fd, 0, (off_t)bytes) != 0) {
         close(*fd);

@@ -1,12 +1,13 @@
 """`whisker export`: a recording as CSV, Parquet or NWB (crunchbot.recording.exporting)."""
 
 import argparse
+from collections import Counter
 from pathlib import Path
 
 from whisker_protocol import LANES
 
 from ..arguments import lane_list, warn
-from ..recording import read
+from ..recording import Recording, read
 from ..recording.exporting import FORMATS, export
 from ..recording.table import ExportError, Table
 
@@ -29,7 +30,19 @@ def run(arguments: argparse.Namespace) -> int:
     with read(arguments.file) as recording:
         table = Table(recording, arguments.lanes)
         export(table, arguments.out)
+        if lost := lost_in(recording):
+            warn(f"{arguments.file}: {lost}")
         for line in recording.damage:
             warn(line)
     print(f"{arguments.out}: {table.frames} frames, lanes {', '.join(table.names)}")
     return 0
+
+
+def lost_in(recording: Recording) -> str:
+    """What was lost before it was written, by its events; empty: nothing."""
+    lost = Counter()
+    for event in recording.events():
+        lost[event.kind] += event.frames
+    missing, overrun = lost["missing"], lost["overrun"]
+    why = f"{missing} never came, {overrun} were not read in time"
+    return f"{missing + overrun} frames are lost, where tick jumps: {why}" if missing + overrun else ""

@@ -128,6 +128,10 @@ def describe_ring(reader: Reader) -> dict:
     return reported
 
 
+def _is_connected(reported: dict) -> bool:
+    return bool(reported.get("daemon", {}).get("connected"))
+
+
 def lines(reported: dict) -> list[str]:
     """The text for a person: a heading per part, a line per value."""
     out = []
@@ -136,5 +140,6 @@ def lines(reported: dict) -> list[str]:
         tables = values if isinstance(values, list) else [values]
         for table in tables:
             out += [part, *(f"  {key}: {value}" for key, value in table.items())]
-        out += [f"{part}: no bridge is plugged in"] if not tables else []
+        apart = "; that of the ring is simulated, or in another container" if _is_connected(reported) else ""
+        out += [f"{part}: no bridge is plugged in{apart}"] if not tables else []
     return out + advised

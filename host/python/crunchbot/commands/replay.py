@@ -18,7 +18,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="X", help=text)
     parser.add_argument(
         "--ring-frames",
-        type=whole_number(64, 1 << 20),
+        type=_power_of_two,
         default=CAPACITY,
         metavar="N",
         help="a power of two",
@@ -37,6 +37,14 @@ def run(arguments: argparse.Namespace) -> int:
             warn(line)
     print(f"ring {arguments.ring}: {replay.frames} frames replayed")
     return 0
+
+
+def _power_of_two(text: str) -> int:
+    value = whole_number(64, 1 << 20)(text)
+    if value & (value - 1):
+        below = 1 << (value.bit_length() - 1)
+        raise argparse.ArgumentTypeError(f"'{text}' is no power of two; give {below} or {2 * below}")
+    return value
 
 
 def _speed(text: str) -> float | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from whisker_protocol import LANES, LIMITS
+from whisker_protocol import CODES, LANES, LIMITS, STATUS_CODE_SHIFT
 
 from ..bridge.ring import Reader, RingError
 from ..native import lib
@@ -17,6 +17,7 @@ from .writing import RecordingWriter
 GATHER_S = 0.1  # between two looks at the ring: a wake per block, not per tick
 RATE_HZ = LIMITS["clock_hz"] / LIMITS["tick_period"]
 SECOND_NS = 10**9
+LANE_OFF = CODES["lane_off"]  # no bad sample: nobody asked for it
 
 
 @dataclass
@@ -113,7 +114,8 @@ class Recorder:
         self._say_gaps(time_ns, block)
         self._writer.block(time_ns, block)
         self.tally.frames += len(block["tick"])
-        self.tally.records_bad += np.count_nonzero(block["lanes"]["status"], axis=1)
+        status = block["lanes"]["status"]
+        self.tally.records_bad += np.count_nonzero((status != 0) & (status >> STATUS_CODE_SHIFT != LANE_OFF), axis=1)
 
     def _say_lost(self, tick: int) -> None:
         """Tell of frames overrun and of a new ring, now that a frame stands behind them."""

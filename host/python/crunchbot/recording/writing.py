@@ -2,6 +2,9 @@
 
 import contextlib
 import errno
+import hashlib
+import os
+import socket
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -47,6 +50,22 @@ class ChunkWriter(Writer):
         super().add_message(channel_id, *arguments)
 
 
+def claim(path: str | Path) -> socket.socket:
+    """One recorder a file: a name that the kernel holds until this is closed or the process ends, and that leaves no file.
+
+    RecordingError when another has it."""
+    held = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    name = hashlib.sha256(os.fsencode(Path(path).resolve())).hexdigest()
+    try:
+        held.bind(f"\0crunchbot-recording-{name}")
+    except OSError as error:
+        held.close()
+        raise RecordingError(
+            f"{path}: is being recorded by another process; stop it, or choose another name"
+        ) from error
+    return held
+
+
 class TopicWriter:
     """An MCAP file of typed topics that ROS 2 bag tools open. Times are in ns since 1970. Use as a context manager.
 
@@ -57,7 +76,12 @@ class TopicWriter:
     def __init__(self, path: str | Path, record: str, metadata: dict[str, str], overwrite: bool = False):
         """`record`: name of the metadata record, which `metadata` begins."""
         self.path, self._record, self._metadata = path, record, metadata
-        self._sink = Sink(path, overwrite)
+        self._claim = claim(path)
+        try:
+            self._sink = Sink(path, overwrite)
+        except BaseException:
+            self._claim.close()
+            raise
         self._writer = ChunkWriter(self._sink, enable_data_crcs=True)
         self._channels: dict[str, int] = {}
         self._counts: dict[str, int] = {}
@@ -107,6 +131,7 @@ class TopicWriter:
     def close(self) -> None:
         """Close without an index, as a crash would."""
         self._sink.close()
+        self._claim.close()
 
     def _begin(self) -> None:
         self._writer.start(profile=Profile.ROS2, library=f"whisker {__version__}")

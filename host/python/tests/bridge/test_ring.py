@@ -4,9 +4,12 @@ import getpass
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 from rings import make_frames, ring_name
 
 from crunchbot.bridge.ring import FRAME, Clock, Reader, RingError, Writer, found_rings, signal_writer
@@ -156,3 +159,13 @@ def test_another_process_reads_the_same_bytes():
         writer.publish(frames[150:])
     assert ours.recv() == frames.tobytes()
     process.join()
+
+
+def test_shared_memory_that_cannot_be_written_is_named():
+    space = ["unshare", "--mount", *([] if os.geteuid() == 0 else ["--map-root-user"])]
+    if subprocess.run([*space, "mount", "-t", "tmpfs", "none", "/dev/shm"], capture_output=True).returncode != 0:
+        pytest.skip("this user may not have a mount namespace")
+    program = f"from crunchbot.bridge.ring import Writer; Writer('{ring_name()}')"
+    shell = f'mount -t tmpfs -o ro none /dev/shm && exec "{sys.executable}" -c "{program}"'
+    done = subprocess.run([*space, "sh", "-c", shell], capture_output=True, text=True, timeout=PATIENCE_S)
+    assert "the shared memory for rings is missing or cannot be written; mount a tmpfs at /dev/shm" in done.stderr

@@ -27,7 +27,7 @@ from crunchbot.commands.top import BARS, sparkline
 from crunchbot.recording import read
 from crunchbot.recording.writing import RecordingWriter
 from crunchbot_lab.commands import bridge_sim
-from whisker_protocol import LIMITS, WIRE_VERSION
+from whisker_protocol import CODES, LIMITS, STATUS_CODE_SHIFT, WIRE_VERSION
 
 
 def test_help_names_every_command_and_imports_none(capsys):
@@ -64,6 +64,7 @@ def test_a_missing_ring_is_one_line(capsys, tmp_path, name):
         (["stream", "--frames", "0"], "'0' is not a whole number of 1 or more"),
         (["replay", "x.mcap", "--speed", "fast"], "'fast' is not a number above 0, nor max"),
         (["replay", "x.mcap", "--ring-frames", "63"], "from 64 to"),
+        (["replay", "x.mcap", "--ring-frames", "1000"], "'1000' is no power of two; give 512 or 1024"),
         (["replay", "x.mcap"], "x.mcap: cannot be read"),
         (["record"], "FILE.MCAP"),
         (["record", "x.mcap", "--seconds", "nan"], "'nan' is not a number above 0"),
@@ -184,6 +185,60 @@ def test_lanes_without_a_node_are_no_bad_samples(capsys, tmp_path):
         out = run(capsys, "record", tmp_path / "a.mcap", "--ring", name, "--frames", 1000)[1]
     bad = np.count_nonzero(frames["lane"]["status"][:, :6])
     assert f"1000 frames, 0 lost, {bad} bad samples; 22 lanes without a good one" in out
+    frames["lane"]["status"][:, 6:] = CODES["lane_off"] << STATUS_CODE_SHIFT
+    with live_ring(frames) as name:
+        out = run(capsys, "record", tmp_path / "b.mcap", "--ring", name, "--frames", 1000)[1]
+    assert out.endswith(f"1000 frames, 0 lost, {bad} bad samples\n")
+
+
+def test_a_file_has_one_recorder(capsys, tmp_path):
+    path = tmp_path / "a.mcap"
+    (tmp_path / "link").symlink_to(tmp_path)
+    with live_ring(make_frames(1000)) as name:
+        with RecordingWriter(path, {}):
+            for same in (path, tmp_path / "link" / "a.mcap"):
+                code, _, err = run(capsys, "record", same, "--ring", name, "--frames", 9, "--overwrite")
+                assert code == 2 and "is being recorded by another process; stop it" in err and err.count("\n") == 1
+            assert run(capsys, "record", tmp_path / "b.mcap", "--ring", name, "--frames", 9)[0] == 0
+        assert run(capsys, "record", path, "--ring", name, "--frames", 9, "--overwrite")[0] == 0
+
+
+def test_a_simulated_bridge_is_beside_none_on_the_usb(capsys, monkeypatch):
+    monkeypatch.setattr(info.usbtree, "bridges", lambda: [])
+    with live_ring(make_frames(10)) as name:
+        out = run(capsys, "info", "--ring", name)[1]
+    assert "usb: no bridge is plugged in; that of the ring is simulated, or in another container" in out
+    with live_ring(make_frames(10), connected=0) as name:
+        assert "usb: no bridge is plugged in\n" in run(capsys, "info", "--ring", name)[1]
+
+
+def test_a_simulated_bridge_that_is_stopped_is_driven_to_its_end(monkeypatch):
+    """A pilot that leaves before the simulation has been asked to end makes an error of it."""
+    stop, seen, courses = threading.Event(), [], []
+    stop.set()
+
+    class Course:
+        def __init__(self, path, drive, pace, over):
+            self.over = over
+            courses.append(self)
+
+        def start(self):
+            seen.append(self.over.is_set())
+
+        def join(self):
+            seen.append(self.over.is_set())
+
+    class Process(subprocess.Popen):
+        def send_signal(self, number):
+            seen.append(courses[0].over.is_set())
+            super().send_signal(number)
+
+    monkeypatch.setattr(bridge_sim, "stop_on_signals", lambda: stop)
+    monkeypatch.setattr(bridge_sim, "_command", lambda arguments, folder: ["sleep", "1000"])
+    monkeypatch.setattr(bridge_sim, "Course", Course)
+    monkeypatch.setattr(bridge_sim.subprocess, "Popen", Process)
+    assert main(["bridge-sim"]) == 0
+    assert seen == [False, False, True]
 
 
 def test_a_recorder_reported_to_stop_finishes_its_file(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow.parquet as parquet
 import pynwb
 import pytest
-from commandkit import run, signals_as_before  # noqa: F401
+from commandkit import live_ring, run, signals_as_before  # noqa: F401
 from rings import make_frames
 from test_recording import write
 
@@ -43,8 +43,20 @@ def degrees(frames, lane: int, axis: str) -> np.ndarray:
 
 def exported(capsys, recording, path, *more):
     code, out, err = run(capsys, "export", recording, path, *more)
-    assert (code, err) == (0, "") and out == f"{path}: {ROWS} frames, lanes {', '.join(NAMES)}\n"
+    lost = "10 frames are lost, where tick jumps: 10 never came, 0 were not read in time"
+    assert (code, err) == (
+        0,
+        f"whisker: warning: {recording}: {lost}\n",
+    ) and out == f"{path}: {ROWS} frames, lanes {', '.join(NAMES)}\n"
     return path
+
+
+def test_what_the_recording_lost_is_said(capsys, tmp_path, frames):
+    with live_ring(frames) as name:
+        assert run(capsys, "record", tmp_path / "a.mcap", "--ring", name, "--frames", len(frames))[0] == 0
+    code, _, err = run(capsys, "export", tmp_path / "a.mcap", tmp_path / "a.csv")
+    assert code == 0 and err.count("\n") == 1
+    assert f"{tmp_path}/a.mcap: 10 frames are lost, where tick jumps: 10 never came, 0 were not read in time" in err
 
 
 def test_csv(capsys, recording, frames, tmp_path):
