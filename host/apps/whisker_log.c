@@ -9,6 +9,7 @@
 #include "cli.h"
 #include "command_line.h"
 #include "follower.h"
+#include "output_file.h"
 #include "whisker/whisker.h"
 
 #define PROGRAM "whisker-log"
@@ -20,6 +21,7 @@
 struct options {
     const char *ring, *bad, *summary, *socket;
     uint32_t lanes, wait_s, owner;
+    bool overwrite;
 };
 
 struct tally {
@@ -31,7 +33,7 @@ struct session {
     const struct options *options;
     struct whisker_reader *reader;
     struct follower follower;
-    FILE *bad;
+    struct output_file bad, summary;
     struct tally tally;
     uint64_t taken; /* ticks reported to the simulation */
 };
@@ -51,6 +53,7 @@ static const struct command_option OPTIONS[] = {
      WHISKER_FRAME_LANES, NULL},
     {"bad", "FILE", "CSV: lane, tick, code, errors of each bad record", COMMAND_TEXT, AT(bad), 0, 0, NULL},
     {"summary", "FILE", "JSON: what was counted", COMMAND_TEXT, AT(summary), 0, 0, NULL},
+    {"overwrite", NULL, "replace these files where they are there already", COMMAND_FLAG, AT(overwrite), 0, 0, NULL},
     {"wait", "S", "wait so many seconds for the ring to come up", COMMAND_NUMBER, AT(wait_s), 0, 3600, NULL},
     {"socket", "PATH", "follow the simulation at this socket: it never runs too far ahead", COMMAND_TEXT, AT(socket), 0,
      0, NULL},
@@ -85,9 +88,9 @@ static void log_bad_records(struct session *session, const struct whisker_frame 
             continue;
         }
         session->tally.records_bad++;
-        if (session->bad) {
+        if (session->bad.file) {
             const unsigned errors = status & ((1u << WHISKER_STATUS_ERROR_BITS) - 1);
-            fprintf(session->bad, "%u,%" PRIu64 ",%u,%u\n", lane, frame->tick, status >> WHISKER_STATUS_ERROR_BITS,
+            fprintf(session->bad.file, "%u,%" PRIu64 ",%u,%u\n", lane, frame->tick, status >> WHISKER_STATUS_ERROR_BITS,
                     errors);
         }
     }
@@ -158,26 +161,31 @@ static int whisker_log_read_stream(struct session *session)
     return WHISKER_OK;
 }
 
-static bool whisker_log_write_summary(const char *path, const struct tally *tally)
+static void whisker_log_write_summary(FILE *file, const struct tally *tally)
 {
-    FILE *file = path ? fopen(path, "w") : NULL;
-    if (!file) {
-        return path == NULL;
-    }
     fprintf(file,
             "{\"frames_received\": %" PRIu64 ", \"gaps\": %" PRIu64 ", \"repeated\": %" PRIu64
             ", \"first_tick\": %" PRIu64 ", \"last_tick\": %" PRIu64 ", \"records_bad\": %" PRIu64
             ", \"overruns\": %" PRIu64 "}\n",
             tally->received, tally->gaps, tally->repeated, tally->first_tick, tally->last_tick, tally->records_bad,
             tally->overruns);
-    const bool written = !ferror(file);
-    return fclose(file) == 0 && written;
 }
 
 static int whisker_log_fail_file(const char *path)
 {
-    fprintf(stderr, PROGRAM ": %s: %s; choose a path that can be written\n", path, strerror(errno));
+    const char *remedy = errno == EEXIST ? "give --overwrite, or another name" : "choose a path that can be written";
+    fprintf(stderr, PROGRAM ": %s: %s; %s\n", path, strerror(errno), remedy);
     return CLI_FAILED;
+}
+
+static int whisker_log_open_file(struct output_file *out, const char *path, bool overwrite)
+{
+    return path && output_file_open(out, path, overwrite) != 0 ? whisker_log_fail_file(path) : CLI_OK;
+}
+
+static int whisker_log_close_file(struct output_file *out, const char *path)
+{
+    return out->file && output_file_close(out) != 0 ? whisker_log_fail_file(path) : CLI_OK;
 }
 
 static void whisker_log_print_ring(const struct whisker_reader *reader, const char *name)
@@ -196,11 +204,6 @@ static void whisker_log_print_ring(const struct whisker_reader *reader, const ch
 static int whisker_log_follow(struct session *session)
 {
     const struct options *options = session->options;
-    const int error =
-        whisker_reader_attach_owned(options->ring, options->owner, (int)options->wait_s * 1000, &session->reader);
-    if (error) {
-        return cli_fail_ring(PROGRAM, options->ring, error);
-    }
     whisker_log_print_ring(session->reader, options->ring);
     if (follower_open(&session->follower, options->socket, "log") != 0) {
         fprintf(stderr, PROGRAM ": %s: %s; start the simulation with this --socket\n", options->socket,
@@ -218,21 +221,23 @@ static int whisker_log_follow(struct session *session)
 static int log_ring(struct session *session)
 {
     const struct options *options = session->options;
-    if (options->bad) {
-        session->bad = fopen(options->bad, "w");
-        if (!session->bad) {
-            return whisker_log_fail_file(options->bad);
-        }
-        fputs("lane,tick,code,errors\n", session->bad);
+    const int error =
+        whisker_reader_attach_owned(options->ring, options->owner, (int)options->wait_s * 1000, &session->reader);
+    if (error) {
+        return cli_fail_ring(PROGRAM, options->ring, error);
     }
-    int result = whisker_log_follow(session);
-    if (session->bad && (ferror(session->bad) | fclose(session->bad)) != 0) {
-        result = whisker_log_fail_file(options->bad);
+    int result = whisker_log_open_file(&session->bad, options->bad, options->overwrite);
+    result = result ? result : whisker_log_open_file(&session->summary, options->summary, options->overwrite);
+    if (session->bad.file) {
+        fputs("lane,tick,code,errors\n", session->bad.file);
     }
-    if (!whisker_log_write_summary(options->summary, &session->tally)) {
-        result = whisker_log_fail_file(options->summary);
+    result = result ? result : whisker_log_follow(session);
+    if (session->summary.file) {
+        whisker_log_write_summary(session->summary.file, &session->tally);
     }
-    return result;
+    const int bad = whisker_log_close_file(&session->bad, options->bad);
+    const int summary = whisker_log_close_file(&session->summary, options->summary);
+    return bad ? bad : summary ? summary : result;
 }
 
 int main(int argc, char **argv)

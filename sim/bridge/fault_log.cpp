@@ -15,9 +15,9 @@ CsvFile::CsvFile(const std::string &path, const std::string &header) : path_(pat
     if (path.empty()) {
         return;
     }
-    file_ = std::fopen(path.c_str(), "w");
+    file_ = std::fopen(path.c_str(), "wx");
     if (!file_) {
-        throw std::runtime_error("cannot write '" + path + "': " + std::strerror(errno));
+        throw std::runtime_error("cannot write '" + path + "': " + std::strerror(errno) + "; choose another name");
     }
     row(header);
 }

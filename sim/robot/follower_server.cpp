@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -41,7 +42,10 @@ FollowerServer::FollowerServer(const std::string &path, unsigned expected, Answe
     }
     const sockaddr_un address = address_of(path);
     listener_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    unlink(path.c_str());
+    struct stat there;
+    if (lstat(path.c_str(), &there) == 0 && S_ISSOCK(there.st_mode)) {
+        unlink(path.c_str()); // one that an earlier simulation has left; nothing else is removed
+    }
     if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 ||
         listen(listener_, BACKLOG) != 0) {
         const std::string reason = std::strerror(errno);

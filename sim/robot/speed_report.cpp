@@ -55,9 +55,9 @@ void write_speed_report(const std::string &path, const Speed &speed, const Fault
     if (path.empty()) {
         return;
     }
-    FILE *file = std::fopen(path.c_str(), "w");
+    FILE *file = std::fopen(path.c_str(), "wx");
     if (!file) {
-        throw std::runtime_error("cannot write '" + path + "': " + std::strerror(errno));
+        throw std::runtime_error("cannot write '" + path + "': " + std::strerror(errno) + "; choose another name");
     }
     std::fprintf(file, "{\"ticks\": %" PRIu64 ", \"simulated_s\": %.4f, \"wall_s\": %.4f, \"realtime_factor\": %.4f,\n",
                  speed.ticks, speed.simulated_s(), speed.wall_s, speed.realtime_factor());

@@ -145,7 +145,7 @@ def test_examples_on_files(place, command):
 
 def test_the_data_set_is_not_written_over(place):
     code, out = run(EXAMPLES["whisker examples"], place)
-    assert code == 2 and "examples is there already; remove it, or name another folder" in out
+    assert code == 2 and "examples: is there already; give --overwrite, or another name" in out
 
 
 def test_the_data_set_is_small_and_says_whose_it_is():

@@ -14,7 +14,7 @@ APPS = Path(os.environ.get("WHISKER_BUILD", "build/release")).resolve() / "host/
 MISTAKES = {
     "whisker": ("COMMAND", "see 'whisker --help'"),
     "whisker localize examples/scene": ("invalid choice: 'localize'", "see 'whisker --help'"),
-    "whisker examples": ("examples is there already", "remove it, or name another folder"),
+    "whisker examples": ("examples: is there already", "give --overwrite, or another name"),
     "whisker localise": ("no scene folder given", "name one, or use --list-filters"),
     "whisker localise nosuch": ("nosuch: no such folder", "give a scene folder"),
     "whisker localise examples": ("examples/arena.toml: cannot be read", "a scene folder needs it"),
@@ -50,7 +50,7 @@ MISTAKES = {
     "whisker scene map examples/scene examples/home.pgm --out s": ("not a text file", "give a map server's YAML"),
     "whisker info --ring nosuch": ("there is no ring of this name", "start whiskerd with this --ring"),
     "whisker record": ("required: FILE.MCAP", "see 'whisker record --help'"),
-    "whisker record examples/drive.mcap --ring nosuch": ("there is no ring", "start whiskerd with this --ring"),
+    "whisker record mine.mcap --ring nosuch": ("there is no ring", "start whiskerd with this --ring"),
     "whisker replay nosuch.mcap": ("nosuch.mcap: cannot be read", "give a recording made by 'whisker record'"),
     "whisker replay examples/contacts.csv": ("not an MCAP file", "give a recording made by 'whisker record'"),
     "whisker replay examples/drive.mcap --speed fast": ("'fast' is not a number above 0", "--help"),

@@ -225,8 +225,39 @@ static void log_without_a_ring_fails_in_one_line(void **state)
 static void log_to_a_path_that_cannot_be_written_fails_in_one_line(void **state)
 {
     (void)state;
+    struct whisker_ring *ring;
+    assert_int_equal(whisker_ring_create(ring_name(), 1024, &ring), 0);
     const char *words[] = {WHISKER_LOG, "--ring", ring_name(), "--bad", "/nowhere/bad.csv", NULL};
     assert_refused(words, 1, "/nowhere/bad.csv: No such file or directory; choose a path");
+    whisker_ring_close(ring);
+}
+
+static void put_old(const char *path)
+{
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs("old\n", file);
+    fclose(file);
+}
+
+static void log_replaces_nothing_unasked_and_nothing_without_a_ring(void **state)
+{
+    (void)state;
+    char bad[128], summary[128];
+    snprintf(bad, sizeof bad, "%s/bad.csv", folder);
+    snprintf(summary, sizeof summary, "%s/log.json", folder);
+    put_old(bad);
+    const char *forced[] = {WHISKER_LOG, "--ring", ring_name(), "--wait", "0", "--overwrite", "--bad", bad, NULL};
+    assert_refused(forced, 1, "there is no ring of this name");
+    assert_string_equal(content("bad.csv"), "old\n");
+    struct whisker_ring *ring;
+    assert_int_equal(whisker_ring_create(ring_name(), 1024, &ring), 0);
+    const char *words[] = {WHISKER_LOG, "--ring", ring_name(), "--summary", summary, "--bad", bad, NULL};
+    assert_refused(words, 1, "bad.csv: File exists; give --overwrite, or another name");
+    assert_string_equal(content("bad.csv"), "old\n");
+    const char *pair[] = {WHISKER_LOG, "--ring", ring_name(), "--overwrite", "--bad", folder, NULL};
+    assert_refused(pair, 1, "File exists");
+    whisker_ring_close(ring);
 }
 
 /* 1000 ticks from tick 0; ticks 10..12 were lost; two lanes have a bad record; lane 7 is not populated. At tick 900 the
@@ -275,12 +306,14 @@ static void log_counts_what_was_published_and_follows_the_simulation(void **stat
     const int listening = listen_at(path);
     struct whisker_ring *ring;
     assert_int_equal(whisker_ring_create(ring_name(), 1024, &ring), 0);
-    const char *words[] = {WHISKER_LOG, "--ring",    ring_name(), "--lanes",  "6",  "--bad",
-                           bad,         "--summary", summary,     "--socket", path, NULL};
+    put_old(bad);
+    const char *words[] = {WHISKER_LOG, "--ring", ring_name(), "--lanes", "6",           "--bad", bad,
+                           "--summary", summary,  "--socket",  path,      "--overwrite", NULL};
     const pid_t child = start(words);
     const int connection = accept(listening, NULL, NULL);
     assert_said(connection, "follow log");
     publish_run(ring);
+    assert_string_equal(content("bad.csv"), "old\n"); /* until the new one is whole */
     whisker_ring_close(ring);
     char message[64] = "";
     uint64_t taken =
@@ -470,6 +503,7 @@ int main(void)
         cmocka_unit_test(help_has_an_example),
         cmocka_unit_test(log_without_a_ring_fails_in_one_line),
         cmocka_unit_test(log_to_a_path_that_cannot_be_written_fails_in_one_line),
+        cmocka_unit_test(log_replaces_nothing_unasked_and_nothing_without_a_ring),
         cmocka_unit_test(log_counts_what_was_published_and_follows_the_simulation),
         cmocka_unit_test(log_says_when_the_writer_dies),
         cmocka_unit_test(replacing_ends_no_process_that_is_not_the_writer),

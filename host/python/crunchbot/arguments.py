@@ -8,14 +8,16 @@ import difflib
 import math
 import pwd
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
 from .errors import UserError
+from .outputs import claim
 
 NO_USER = 2**32 - 1  # as a user id: nobody's
 UNKNOWN = "unrecognized arguments: "  # as argparse begins it
+NAME = "NAME"  # metavar of what is no path
 RING = "whisker"  # the name whiskerd's unit gives its ring
 
 
@@ -82,6 +84,44 @@ def add_action(actions: Any, name: str, text: str, example: str, run: Callable[[
     parser.show_example(example)
     parser.set_defaults(run=run)
     return parser
+
+
+def add_output(parser: Any, *names: str, own: tuple[str, ...] | None = (), **options: Any) -> None:
+    """An argument that names what is written, with --overwrite beside it. own: as of `outputs.claim`; None: a folder in which
+    the command claims each file itself."""
+    parser.add_argument(*names, **options).own = own
+    if "--overwrite" not in parser._option_string_actions:
+        parser.add_argument("--overwrite", action="store_true", help="replace what is there already")
+
+
+def claim_outputs(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
+    """OutputError when an output of the chosen command may not be written to: before any of its work."""
+    actions = list(actions_of(parser))
+    outputs = {action.dest: action.own for action in actions if hasattr(action, "own")}
+    inputs = [a.dest for a in actions if is_path(a) and a.dest not in outputs]
+    read = [path for dest in inputs for path in _paths(getattr(arguments, dest, None))]
+    for dest, own in outputs.items():
+        path = getattr(arguments, dest, None)
+        if path is not None and own is not None:
+            claim(path, arguments.overwrite, own, read)
+
+
+def _paths(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [] if value is None else [value]
+
+
+def actions_of(parser: argparse.ArgumentParser) -> Iterator[Any]:
+    """Every argument, those of subcommands too."""
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for inner in action.choices.values():
+                yield from actions_of(inner)
+
+
+def is_path(action: Any) -> bool:
+    """Whether an argument names a file or a folder, as far as its parser can know."""
+    return action.type in (Path, None) and action.nargs != 0 and not action.choices and action.metavar != NAME
 
 
 def plain(values: dict) -> dict:

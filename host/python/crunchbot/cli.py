@@ -8,13 +8,11 @@ import argparse
 import contextlib
 import importlib
 import sys
-from collections.abc import Iterator
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from . import __version__
-from .arguments import Parser
+from .arguments import Parser, actions_of, claim_outputs, is_path
 from .ends import exit_code
 from .errors import UserError
 from .lab import import_lab
@@ -79,7 +77,9 @@ def _run(words: list[str]) -> int:
 
 
 def _run_command(words: list[str]) -> int:
-    arguments = parser_of(next(iter(words), "")).parse_args(words)
+    parser = parser_of(next(iter(words), ""))
+    arguments = parser.parse_args(words)
+    claim_outputs(parser, arguments)
     return arguments.run(arguments)
 
 
@@ -90,21 +90,12 @@ class PrintCompletion(argparse.Action):
         import shtab
 
         whole = parser_of()
-        for action in _actions_of(whole):
+        for action in actions_of(whole):
             action.choices = action.choices or getattr(action, "values", None)
-            if action.type in (Path, None) and action.nargs != 0 and not action.choices:
+            if is_path(action):
                 action.complete = shtab.FILE
         print(shtab.complete(whole, shell))
         parser.exit()
-
-
-def _actions_of(parser: argparse.ArgumentParser) -> Iterator[Any]:
-    """Every argument, those of subcommands too."""
-    for action in parser._actions:
-        yield action
-        if isinstance(action, argparse._SubParsersAction):
-            for inner in action.choices.values():
-                yield from _actions_of(inner)
 
 
 def parser_of(chosen: str | None = None) -> Parser:

@@ -1,9 +1,13 @@
 """Text, TOML and JSON that anybody may have written: read whole or refused with a reason, in bounded memory."""
 
+import errno
 import json
+import os
+import stat
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 BYTES_MOST = 1 << 28  # no table, scene or model is larger
 
@@ -12,10 +16,17 @@ class UnreadableError(ValueError):
     """Why a file cannot be read, in a few words without the file's name: who reads it adds that and the remedy."""
 
 
+def open_file(path: str | Path) -> BinaryIO:
+    """Opened to be read. OSError for a pipe or a device, too: opening a pipe waits until somebody writes into it."""
+    if not stat.S_ISREG(os.stat(path).st_mode) and not os.path.isdir(path):
+        raise OSError(errno.EINVAL, "no regular file")
+    return open(path, "rb")
+
+
 def read_text(path: str | Path) -> str:
     """UTF-8, with or without a byte-order mark."""
     try:
-        with open(path, "rb") as file:
+        with open_file(path) as file:
             data = file.read(BYTES_MOST + 1)
         if len(data) > BYTES_MOST:
             raise UnreadableError(f"more than {BYTES_MOST >> 20} MiB")

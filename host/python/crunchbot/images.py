@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .files import UnreadableError
+from .files import UnreadableError, open_file
 
 PIXELS_MOST = 10**8  # one byte each, and a few more while they are read
 FORMATS = ("PNG", "PPM", "BMP")
@@ -25,10 +25,9 @@ def read_grey(path: str | Path) -> Grey:
     from PIL import Image  # only who reads an image needs it
 
     try:
-        with warnings.catch_warnings():
+        with open_file(path) as file, warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit here is the lower one
-            image = Image.open(path, formats=FORMATS)
-        with image:
+            image = Image.open(file, formats=FORMATS)
             width, height = image.size
             if width * height > PIXELS_MOST:
                 raise UnreadableError(f"{width} x {height} pixels, {PIXELS_MOST:g} are the most; make it coarser")

@@ -23,6 +23,7 @@ from .sensor_tables import SensorTable, read_sensors, write_sensor
 __all__ = ["LARGEST_M", "SceneError"]  # beside what is defined here
 
 ARENA, ROBOT, PRIOR, OBSERVATIONS = "arena.toml", "robot.toml", "prior.toml", "observations.csv"
+HELD = (ROBOT, ARENA, PRIOR, OBSERVATIONS, "*.csv", "*.png")  # what stands in a folder, with its tables and images
 TEXTURES_MOST = 250  # texture indices are one byte in host/nav, with room for its marks
 WHISKERS_MOST, OBSTACLES_MOST = 1000, 10_000
 TILES_MOST = 10_000_000

@@ -26,11 +26,6 @@ class TableError(UserError, ValueError):
         super().__init__(f"{place}: {text}")
 
 
-def unwritable(path: str | Path, error: OSError) -> TableError:
-    """What to say of an --out that cannot be written."""
-    return TableError(path, None, f"cannot be written ({error.strerror}); choose another --out")
-
-
 def number(cell: str) -> float:
     """A cell as a number; whatever is none, an empty cell too, is nan."""
     try:

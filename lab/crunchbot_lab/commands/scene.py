@@ -2,11 +2,11 @@
 
 import argparse
 
-from crunchbot.arguments import add_action, add_topics, warn
+from crunchbot.arguments import add_action, add_output, add_topics, warn
 from crunchbot.nav.filters import SettingError
 from crunchbot.nav.observations import observations_path, read_observations
-from crunchbot.scene import OBSTACLES_MOST, SceneError, load, write
-from crunchbot.tables import unwritable
+from crunchbot.outputs import made
+from crunchbot.scene import HELD, OBSTACLES_MOST, SceneError, load, write
 
 from .. import scenes
 
@@ -19,7 +19,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     p.add_argument("--family", metavar="F", help="a base and any modifiers, joined by '+'; see --list-families")
     p.add_argument("--seed", type=int, default=0, help="draws arena, path and noise")
     p.add_argument("--steps", type=int, metavar="N", help="rows of 0.1 s (default: the family's)")
-    p.add_argument("--out", metavar="DIR", help="folder to write")
+    add_output(p, "--out", own=HELD, metavar="DIR", help="folder to write")
     p.add_argument("--list-families", action="store_true", help="print bases and modifiers and leave")
     example = "whisker scene from robot-run/robot.mcap --out scenes/run"
     p = add_action(actions, "from", "make a scene of a run's recording", example, from_recording)
@@ -35,13 +35,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     p.add_argument("recording", help=text)
     p.add_argument("--scene", metavar="SCENE", help="arena, robot and prior of a bag: those that it lacks, or others")
     add_topics(p)
-    p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
+    add_output(p, "--out", own=HELD, required=True, metavar="DIR", help="folder to write")
     example = "whisker scene map examples/scene examples/home.yaml --out scenes/mapped"
     text = "put an occupancy map into a scene folder, for all commands that take one"
     p = add_action(actions, "map", text, example, with_map)
     p.add_argument("scene", help="scene folder; without arena.toml the map is the arena, and its origin the arena's")
     p.add_argument("map", metavar="MAP.YAML", help="a ROS map server's YAML file")
-    p.add_argument("--out", required=True, metavar="DIR", help="folder to write")
+    add_output(p, "--out", own=HELD, required=True, metavar="DIR", help="folder to write")
 
 
 def make(arguments: argparse.Namespace) -> int:
@@ -53,9 +53,9 @@ def make(arguments: argparse.Namespace) -> int:
         raise SettingError("scene make: needs --family and --out; see --list-families")
     if arguments.seed < 0 or (arguments.steps is not None and arguments.steps < 1):
         raise SettingError("scene make: --seed or --steps is too small; give 0 or more, and 1 or more")
-    made = scenes.make(arguments.family, arguments.seed, arguments.steps)
-    _write(arguments.out, made.scene, made.observations)
-    print(f"{arguments.out}: {arguments.family}, seed {arguments.seed}, {len(made.observations.t_s)} rows")
+    drawn = scenes.make(arguments.family, arguments.seed, arguments.steps)
+    _write(arguments, drawn.scene, drawn.observations)
+    print(f"{arguments.out}: {arguments.family}, seed {arguments.seed}, {len(drawn.observations.t_s)} rows")
     return 0
 
 
@@ -64,7 +64,7 @@ def from_recording(arguments: argparse.Namespace) -> int:
         raise SettingError(f"scene from: kind '{arguments.kind}' is unknown; choose one of {', '.join(scenes.READERS)}")
     given = (arguments.scene, arguments.topics)
     scene, observations = scenes.read_recording(arguments.recording, warn, arguments.kind, *given)
-    _write(arguments.out, scene, observations)
+    _write(arguments, scene, observations)
     print(f"{arguments.out}: from {arguments.recording}, {len(observations)} rows")
     return 0
 
@@ -78,16 +78,14 @@ def with_map(arguments: argparse.Namespace) -> int:
         )
     path = observations_path(arguments.scene)
     observations = read_observations(path, scene) if path.exists() else None
-    _write(arguments.out, scene, None if observations is None else scenes.rounded(observations))
+    _write(arguments, scene, None if observations is None else scenes.rounded(observations))
     print(f"{arguments.out}: {arguments.scene} with {arguments.map}, {boxes} boxes")
     return 0
 
 
-def _write(path: str, scene, observations) -> None:
-    try:
+def _write(arguments: argparse.Namespace, scene, observations) -> None:
+    with made(arguments.out, arguments.overwrite, HELD) as folder:
         if observations is None:
-            write(path, scene)
+            write(folder, scene)
         else:
-            scenes.write_scene(path, scene, observations)
-    except OSError as error:
-        raise unwritable(path, error) from error
+            scenes.write_scene(folder, scene, observations)

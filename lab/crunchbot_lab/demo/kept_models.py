@@ -7,12 +7,12 @@ follow from: the scene with its whiskers, the seed, and the programs that record
 import hashlib
 import os
 import shutil
-import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 import crunchbot
+from crunchbot.outputs import made
 from crunchbot.scene import Scene
 
 from . import training
@@ -62,11 +62,7 @@ def _programs() -> bytes:
 
 def _keep(folder: Path, place: Path) -> None:
     """Copy a folder's models to their place in the cache, all or none: two runs may end at once."""
-    place.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=place.parent) as made:
-        whole = Path(made) / "models"
+    with made(place, True, ("*.json",)) as whole:
         whole.mkdir()
         for model in folder.glob("*.json"):
             shutil.copyfile(model, whole / model.name)
-        if not place.is_dir():
-            whole.rename(place)

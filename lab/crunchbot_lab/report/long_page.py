@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from crunchbot.outputs import put
+
 from . import figures, long_figures, spoken
 from .html import document, figure, percent, section, table, tiles
 from .long_figures import LOST_M
@@ -18,7 +20,7 @@ LEVELS = {
 def write_report(folder: Path) -> Path:
     """Read the run in `folder` and write its report.html; returns the file's path."""
     run, path = Run.load(folder), folder / "report.html"
-    path.write_text(render(run))
+    put(path, render(run))
     return path
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from crunchbot.occupancy import to_map
+from crunchbot.outputs import put
 from crunchbot.recording.mcapfile import McapFile
 from crunchbot.robot.network.messages import OccupancyGrid, TouchMap, decode
 from crunchbot.scene import Scene, load
@@ -54,7 +55,7 @@ class MapRun:
 def write_report(folder: Path) -> Path:
     """Read the runs in `folder` and write its report.html; returns the file's path."""
     path = folder / "report.html"
-    path.write_text(render(read(folder)))
+    put(path, render(read(folder)))
     return path
 
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from crunchbot.outputs import put
+
 from . import figures, motion, spoken
 from .figures import TITLES
 from .html import document, figure, folded, pairs, paragraph, percent, script, section, table, tiles
@@ -27,7 +29,7 @@ def write_report(folder: Path) -> Path:
     """Read the run in `folder` and write its report.html; returns the file's path."""
     run = Run.load(folder)
     path = folder / "report.html"
-    path.write_text(render(run))
+    put(path, render(run))
     return path
 
 

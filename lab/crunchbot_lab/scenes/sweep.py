@@ -13,6 +13,8 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from crunchbot.outputs import put
+
 
 def sweep(
     work: Callable[..., dict],
@@ -41,9 +43,7 @@ def _path(folder: Path, name: str) -> Path:
 
 def _keep(path: Path, result: dict) -> None:
     """Whole or not at all."""
-    fresh = path.with_name(f".{path.name}.new")
-    fresh.write_text(json.dumps(result, sort_keys=True) + "\n")
-    fresh.replace(path)
+    put(path, json.dumps(result, sort_keys=True) + "\n", sync=False)
 
 
 def _in_processes(work, jobs: dict[str, dict], workers: int) -> Iterator[tuple[str, dict]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from whisker_protocol import LANES
 
 from ..errors import UserError
+from ..files import UnreadableError, read_text
 
 # A row of the table (lane, serial, version) or a line of the log; a node without a number of its own has `none`.
 ROW = re.compile(r"^ *(\d+) +(\d+|none) +\d+\.\d+ |\blane (\d+): serial (\d+|none),")
@@ -21,9 +22,9 @@ class NodeError(UserError):
 def read_nodes(path: str | Path) -> dict[int, int]:
     """Serial numbers by lane; later lines count. NodeError when the file cannot be read or lists none."""
     try:
-        lines = Path(path).read_text().splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise NodeError(f"{path}: cannot be read ({error}); write it with: whisker info --nodes > {path}") from error
+        lines = read_text(path).splitlines()
+    except UnreadableError as error:
+        raise NodeError(f"{path}: {error}; write it with: whisker info --nodes > {path}") from error
     found = {}
     for line in lines:
         if not (row := ROW.search(line)):

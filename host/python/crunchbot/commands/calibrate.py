@@ -10,11 +10,11 @@ import numpy as np
 
 from whisker_protocol import LANES
 
-from ..arguments import add_ring, number_above, number_list, warn, whole_number
+from ..arguments import add_output, add_ring, number_above, number_list, warn, whole_number
 from ..bridge.nodes import NodeError, read_nodes
 from ..bridge.ring import Reader
+from ..outputs import claim, made, unwritable
 from ..scene import load
-from ..tables import unwritable
 from ..touch.calibration import (
     TICKS_PER_S,
     ContactsFile,
@@ -28,14 +28,14 @@ from ..touch.calibration import (
 )
 from ..touch.radial.model import Contact, fit, read_whisks, shape_of
 
+REST = "rest.toml"
 EXAMPLE = "whisker calibrate --out calibration"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     add_ring(parser)
-    parser.add_argument(
-        "--out", required=True, type=Path, metavar="DIR", help="writes rest.toml, and <lane>.csv with --lane"
-    )
+    text = "writes rest.toml where there is none, and <lane>.csv with --lane"
+    add_output(parser, "--out", own=None, required=True, type=Path, metavar="DIR", help=text)
     parser.add_argument(
         "--lane", type=whole_number(0, LANES - 1), metavar="N", help="the whisker to press against the post"
     )
@@ -65,17 +65,17 @@ def run(arguments: argparse.Namespace) -> int:
     names = [whisker.name for whisker in load(arguments.scene).robot.whiskers] if arguments.scene else []
     names += [f"lane{n}" for n in range(len(names), LANES)]
     node = _node(arguments)
-    try:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        with Reader(arguments.ring, arguments.wait, arguments.ring_owner) as reader:
-            feed = Feed(reader)
-            if not arguments.backlog:
-                feed.skip()
-            return _calibrate(arguments, feed, names, node)
-    except OSError as error:
-        if error.filename is None:
-            raise
-        raise unwritable(error.filename, error) from error
+    name = REST if arguments.lane is None else f"{names[arguments.lane]}.csv"
+    claim(arguments.out / name, arguments.overwrite, inputs=[arguments.nodes] if arguments.nodes else [])
+    with Reader(arguments.ring, arguments.wait, arguments.ring_owner) as reader:
+        feed = Feed(reader)
+        if not arguments.backlog:
+            feed.skip()
+        try:
+            arguments.out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise unwritable(arguments.out, error) from error
+        return _calibrate(arguments, feed, names, node)
 
 
 def _node(arguments) -> int | None:
@@ -94,7 +94,8 @@ def _calibrate(arguments, feed: Feed, names: list[str], node: int | None) -> int
     _ask(arguments, feed, "Leave all whiskers untouched")
     frames = feed.frames(round(arguments.rest_seconds * TICKS_PER_S))
     rests = measure_rest(frames)
-    write_rest(arguments.out / "rest.toml", rests, names)
+    if arguments.overwrite or not (arguments.out / REST).exists():
+        write_rest(arguments.out / REST, rests, names)
     for rest in rests:
         print(_rest_line(rest, names))
     if arguments.lane is None:
@@ -105,7 +106,10 @@ def _calibrate(arguments, feed: Feed, names: list[str], node: int | None) -> int
         continue  # the rest of a whisker that is touched now and then is still its rest
     whisks = collect(feed, finder)
     number, wanted = itertools.count(1), len(arguments.radii) * arguments.repeats
-    with closing(ContactsFile(path, arguments.whisk_rad_s, node)) as file:
+    with (
+        made(path, arguments.overwrite, grows=True) as place,
+        closing(ContactsFile(place, arguments.whisk_rad_s, node)) as file,
+    ):
         for radius_mm in arguments.radii:
             text = (
                 f"Post at {radius_mm:g} mm, {names[arguments.lane]} clear of it; then whisk {arguments.repeats} times"

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from whisker_protocol import LANES
 
-from ..arguments import lane_list, warn
+from ..arguments import add_output, lane_list, warn
 from ..recording import Recording, read
 from ..recording.exporting import FORMATS, export
-from ..recording.table import ExportError, Table
+from ..recording.table import Table
 
 EXAMPLE = "whisker export examples/drive.mcap drive.parquet"
 
@@ -17,16 +17,13 @@ EXAMPLE = "whisker export examples/drive.mcap drive.parquet"
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE.MCAP", help="of 'whisker record'")
     text = f"to be written; the format is that of its ending: {', '.join(FORMATS)}"
-    parser.add_argument("out", type=Path, metavar="OUT", help=text)
+    add_output(parser, "out", type=Path, metavar="OUT", help=text)
     text = "such as 0,2,5-7 (default: those in use)"
     parser.add_argument("--lanes", type=lane_list(LANES), metavar="LIST", help=text)
-    parser.add_argument("--overwrite", action="store_true", help="replace OUT if it exists")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    if arguments.out.exists() and not arguments.overwrite:
-        raise ExportError(f"{arguments.out}: is there already; give --overwrite, or another name")
     with read(arguments.file) as recording:
         table = Table(recording, arguments.lanes)
         export(table, arguments.out)

@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 
+from ..arguments import add_output
 from ..nav import localise
 from ..nav.localise import SettingError
 from ..scene import PRIOR, SceneError, load
@@ -21,7 +22,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting, see --list-settings"
     )
-    parser.add_argument("--out", metavar="EST.CSV", help="write t_s, x_m, y_m, theta_rad, confidence of every row")
+    add_output(parser, "--out", metavar="EST.CSV", help="write t_s, x_m, y_m, theta_rad, confidence of every row")
     text = "occupancy map (a ROS map server's YAML file): its boxes in place of arena.toml's, or of all of it where there is none"
     parser.add_argument("--map", metavar="MAP.YAML", help=text)
     parser.add_argument("--json", action="store_true", help="print the summary as one line of JSON")

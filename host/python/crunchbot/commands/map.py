@@ -3,6 +3,7 @@
 import argparse
 import json
 
+from ..arguments import add_output
 from ..nav import mapping
 
 EXAMPLE = "whisker map examples/scene --out touched --json"
@@ -10,9 +11,8 @@ EXAMPLE = "whisker map examples/scene --out touched --json"
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", help="folder with robot.toml and observations.csv; nothing else of it is read")
-    parser.add_argument(
-        "--out", required=True, metavar="MAP", help="folder to write: a scene for localise, and map.yaml"
-    )
+    text = "folder to write: a scene for localise, and map.yaml"
+    add_output(parser, "--out", own=mapping.HELD, required=True, metavar="MAP", help=text)
     parser.add_argument("--no-lattice", action="store_true", help="do not look for a lattice of tiles")
     parser.add_argument("--json", action="store_true", help="print the summary as one line of JSON")
     parser.set_defaults(run=run)
@@ -21,6 +21,6 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     robot, textures, rows = mapping.read(arguments.scene)
     mapped = mapping.run(robot, textures, rows, not arguments.no_lattice, arguments.json)
-    reported = mapping.summary(mapped, mapping.write_map(arguments.out, mapped))
+    reported = mapping.summary(mapped, mapping.write_map(arguments.out, mapped, arguments.overwrite))
     print(json.dumps(reported) if arguments.json else "\n".join(f"{key}: {value}" for key, value in reported.items()))
     return 0

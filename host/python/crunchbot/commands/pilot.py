@@ -10,10 +10,11 @@ from types import SimpleNamespace
 
 from whisker_protocol import LANES
 
-from ..arguments import RING, add_ring_owner, whole_number
+from ..arguments import RING, add_output, add_ring_owner, whole_number
 from ..bridge.nodes import NodeError
 from ..bridge.ring import Reader
 from ..errors import UserError
+from ..outputs import opened, put
 from ..pilot.base import Base
 from ..pilot.pilot import Pilot
 from ..pilot.wheels import EXACT, Wheels
@@ -35,8 +36,8 @@ from ..stopping import stop_on_signals
 EXAMPLE = "whisker pilot robot-run/scene --models robot-run/models --base base.sock"
 RING_WAIT_S = 10.0  # for the ring of a simulation that waits for us
 OTHERS_WAIT_S = 60.0
-GREETING_S = 10.0  # a live pilot goes on without them
 NOWHERE = "/dev/null"
+GREETING_S = 10.0  # a live pilot goes on without them
 
 
 class PilotError(UserError):
@@ -65,9 +66,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--await", action="append", default=[], dest="others", metavar="PROCESS", help="begin when it is there, too"
     )
-    parser.add_argument("--out", default=NOWHERE, metavar="FILE", help="observations.csv, as in docs/formats.md")
-    parser.add_argument("--traces", default=NOWHERE, metavar="FILE", help="CSV of the floor whiskers' deflection")
-    parser.add_argument("--report", type=Path, metavar="FILE", help="JSON of what was used, skipped and measured")
+    add_output(parser, "--out", default=NOWHERE, metavar="FILE", help="observations.csv, as in docs/formats.md")
+    add_output(parser, "--traces", default=NOWHERE, metavar="FILE", help="CSV of the floor whiskers' deflection")
+    add_output(parser, "--report", type=Path, metavar="FILE", help="JSON of what was used, skipped and measured")
     parser.set_defaults(run=run)
 
 
@@ -103,8 +104,7 @@ def _parts(arguments, body: tuple, link: Link, wheels: Wheels, stack: ExitStack)
     pilot = Pilot(scene.robot, texture, radial, arguments.seed, wheels)
     made = choices_of(arguments.choose, scene.robot, pilot.behaviour.choices)
     pilot.behaviour.choices, taker = made
-    out = stack.enter_context(open(arguments.out, "w", newline=""))  # noqa: SIM115
-    traces = stack.enter_context(open(arguments.traces, "w", newline=""))  # noqa: SIM115
+    out, traces = (stack.enter_context(opened(path, arguments.overwrite)) for path in (arguments.out, arguments.traces))
     parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "publisher": Publisher(link, pilot, taker)}
     return SimpleNamespace(pilot=pilot, flight=None, base_health={}, **parts)
 
@@ -163,4 +163,4 @@ def _known_wheels(base: LiveBase, link: Link, stop: threading.Event) -> Wheels:
 def _write_report(path: Path, parts: SimpleNamespace) -> None:
     pilot = parts.pilot
     content = {"ticks_used": parts.flight.ticks_used, "rows": parts.publisher.rows, "bad_samples": pilot.bad_samples}
-    path.write_text(json.dumps(content | {"whisks": pilot.whisks, "base": parts.base_health}, indent=1) + "\n")
+    put(path, json.dumps(content | {"whisks": pilot.whisks, "base": parts.base_health}, indent=1) + "\n")

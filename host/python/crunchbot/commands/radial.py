@@ -5,13 +5,13 @@ import json
 
 import numpy as np
 
-from ..arguments import add_action, plain, warn
+from ..arguments import add_action, add_output, plain, warn
 from ..bridge.nodes import check_node
-from ..tables import TableError, unwritable
+from ..tables import TableError
 from ..touch.contact_filter import ContactFilter, Reports
 from ..touch.radial import model as radial
 
-EXAMPLE = "whisker radial fit examples/contacts.csv --out model.json"
+EXAMPLE = "whisker radial fit examples/contacts.csv --out contacts.json"
 COLUMNS = "whisk_rad_s and base_rad_s, or push_mm_s, or depth_mm; direction_deg of the touch"
 DOUBTED, DOUBTED_LEAST = 0.5, 3  # confidence; fewer contacts say nothing of the whisker
 KINDS = """paper or linear: equation 3, a line through the peaks; quadratic, rational: a curve instead; whisk: whole body
@@ -23,7 +23,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "fit", "fit contacts of known radius", EXAMPLE, fit)
     p.add_argument("contacts", help="CSV: contact, radius_mm, t_s, channels; where known " + COLUMNS)
-    p.add_argument("--out", required=True, metavar="MODEL.JSON")
+    add_output(p, "--out", required=True, metavar="MODEL.JSON")
     p.add_argument("--model", choices=radial.MODELS, default="default", help=KINDS)
     example = "whisker radial predict examples/radial.json examples/contacts.csv --json"
     p = add_action(actions, "predict", "estimate the radius of each contact", example, predict)
@@ -46,8 +46,6 @@ def fit(arguments: argparse.Namespace) -> int:
         radial.save(found.model, arguments.out)
     except ValueError as error:
         raise TableError(arguments.contacts, None, str(error)) from error
-    except OSError as error:
-        raise unwritable(arguments.out, error) from error
     print("model      places left out  contacts left out  (RMS error, mm)")
     for name, errors in found.tried.items():
         mark = "  chosen" if errors == (found.place_mm, found.contact_mm) else ""

@@ -6,9 +6,10 @@ import tempfile
 from pathlib import Path
 
 from .. import scene as scenes
-from ..arguments import RING, add_zenoh_config, number_above, whole_number
+from ..arguments import RING, add_output, add_zenoh_config, number_above, whole_number
 from ..errors import UserError
 from ..lab import import_lab
+from ..outputs import made, put
 from ..progress import bar
 from ..robot.models import load_models
 from ..robot.network.link import read_config
@@ -16,9 +17,9 @@ from ..robot.network.options import link_that_warns
 from ..robot.network.truth import TruthWatcher
 from ..robot.policy import add_choices
 from ..robot.processes import holders, parts
-from ..robot.processes.logs import run_folder
+from ..robot.processes.logs import run_files, run_folder
 from ..robot.processes.supervisor import Supervisor
-from ..robot.processes.units import TARGET, Installed, units
+from ..robot.processes.units import HELD, TARGET, Installed, units
 from ..robot.terminal import Terminal
 from ..stopping import stop_on_signals
 
@@ -58,7 +59,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "simulated seconds per second, at most (default: %(default)s); less, where this machine is too busy"
     parser.add_argument("--pace", type=number_above(0.0), default=1.0, metavar="X", help=text)
     text = "write systemd units that start these processes on a real robot into this folder, and start nothing"
-    parser.add_argument("--units", type=Path, metavar="DIR", help=text)
+    add_output(parser, "--units", own=HELD, type=Path, metavar="DIR", help=text)
     parser.set_defaults(run=run)
 
 
@@ -68,16 +69,19 @@ def run(arguments: argparse.Namespace) -> int:
         return _write_units(arguments)
     stop = stop_on_signals()
     _look_first(arguments)
+    files = run_files(arguments.out)
     logs = run_folder(arguments.out / "logs")
     with tempfile.TemporaryDirectory(prefix="whisker-") as folder:
         address = (arguments.listen, arguments.first_port, arguments.zenoh_config)
         meeting = parts.Meeting(arguments.ring, Path(folder), *address)
-        table = _table(arguments, meeting)
+        table = _table(arguments, meeting, files)
         with link_that_warns("supervisor", [meeting.endpoint(0)], arguments.zenoh_config) as link:
             if arguments.simulated:
                 TruthWatcher(meeting.simulation, link, stop).start()
             until = parts.BRIDGE if arguments.simulated else None
             print(f"starting {', '.join(program.name for program in table)}; logs: {logs}", flush=True)
+            if arguments.desktop:
+                print(f"bag: {files['bag']}" + (f"; map: {files['map']}" if arguments.map else ""), flush=True)
             page = logs / "view.log" if arguments.desktop and not arguments.no_view else None
             Terminal(arguments.ring, page, arguments.pace, stop, _tell).start()
             ended = Supervisor(table, logs, link, until).run(stop)
@@ -102,15 +106,13 @@ def _write_units(arguments) -> int:
     if arguments.desktop:
         view = None if arguments.no_view else arguments.view_port
         table += parts.desktop(body, meeting, meeting.bag, view, meeting.map_folder if arguments.map else None)
-    made = units(table, meeting)
-    try:
-        arguments.units.mkdir(parents=True, exist_ok=True)
-        for name, text in made.items():
-            (arguments.units / name).write_text(text)
-    except OSError as error:
-        raise UserError(f"--units {arguments.units}: cannot be written ({error.strerror}); choose another") from error
+    described = units(table, meeting)
+    with made(arguments.units, arguments.overwrite, HELD) as folder:
+        folder.mkdir()
+        for name, text in described.items():
+            (folder / name).write_text(text)
     print(
-        f"{arguments.units}: {', '.join(made)}; next: copy them to /etc/systemd/system, systemctl enable --now {TARGET}"
+        f"{arguments.units}: {', '.join(described)}; next: copy them to /etc/systemd/system, systemctl enable --now {TARGET}"
     )
     return 0
 
@@ -136,9 +138,9 @@ def _look_first(arguments) -> None:
         print(f"whisker: warning: {warning}", file=sys.stderr)
 
 
-def _table(arguments, meeting: parts.Meeting) -> list:
+def _table(arguments, meeting: parts.Meeting, files: dict[str, Path]) -> list:
     if arguments.simulated:
-        body, simulated = _simulated(arguments, meeting)
+        body, simulated = _simulated(arguments, meeting, files)
         table = [parts.bridge(simulated, body, meeting)]
     else:
         body = parts.Body(
@@ -147,8 +149,7 @@ def _table(arguments, meeting: parts.Meeting) -> list:
         table = []
     if arguments.desktop:
         view = None if arguments.no_view else arguments.view_port
-        map_folder = arguments.out / "map" if arguments.map else None
-        table += parts.desktop(body, meeting, arguments.out / "robot.mcap", view, map_folder)
+        table += parts.desktop(body, meeting, files["bag"], view, files["map"] if arguments.map else None)
     if not arguments.no_daemon:
         table.append(parts.daemon(body, meeting, arguments.simulated))
     return table + parts.netbook(body, meeting, _awaited(arguments))
@@ -159,23 +160,29 @@ def _awaited(arguments) -> str | None:
     return (parts.MAPPER if arguments.map else parts.NAVIGATOR) if arguments.desktop else None
 
 
-def _simulated(arguments, meeting: parts.Meeting) -> tuple[parts.Body, parts.Simulated]:
+def _simulated(arguments, meeting: parts.Meeting, files: dict[str, Path]) -> tuple[parts.Body, parts.Simulated]:
     """The simulated robot; what it needs is written below --out, its models learnt there if none are given."""
     out, seed, user = arguments.out, arguments.seed, "robot: --simulated"
-    folder = arguments.scene or out / "scene"
+    folder = arguments.scene or files["scene"]
     bridge = import_lab("simulation.bridge", user)
     scene, start = bridge.simulated_scene(arguments.scene and str(arguments.scene), seed)
     if arguments.scene is None:
-        scenes.write(folder, scene)
-    (out / "scene.flat").write_text(scene.flat(start))
+        with made(folder, False, scenes.HELD) as fresh:
+            scenes.write(fresh, scene)
+    out.mkdir(parents=True, exist_ok=True)
+    put(files["flat"], scene.flat(start), overwrite=False)
     models = arguments.models or out / "models"
     if arguments.models is None and not (models / "texture.json").exists():
         kept = import_lab("demo.kept_models", user)
         models_wanted = 1 + len(scene.robot.of_role("object"))
         print("learning textures and distances of this robot, or copying what was learnt before", flush=True)
-        with bar(total=models_wanted, desc="models", unit="model", disable=None) as done:
-            result = kept.learn_or_copy(models, scene, seed, lambda: done.update(1))
+        with (
+            bar(total=models_wanted, desc="models", unit="model", disable=None) as done,
+            made(models, False, ("texture.json", "*")) as fresh,
+        ):
+            fresh.mkdir()
+            result = kept.learn_or_copy(fresh, scene, seed, lambda: done.update(1))
         print(f"models: {result}", flush=True)
     body = parts.Body(folder, models, arguments.create, meeting.serial, seed, arguments.choose)
-    reported = (arguments.level, seed, arguments.seconds, arguments.pace, out / "truth.csv", out / "wheels.csv")
-    return body, parts.Simulated(out / "scene.flat", *reported)
+    reported = (arguments.level, seed, arguments.seconds, arguments.pace, files["truth"], files["wheels"])
+    return body, parts.Simulated(files["flat"], *reported)

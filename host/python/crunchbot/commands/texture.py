@@ -6,10 +6,10 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from ..arguments import add_action, plain, warn
+from ..arguments import add_action, add_output, plain, warn
 from ..nav.localise import SettingError
 from ..progress import bar as progress_bar
-from ..tables import TableError, unwritable
+from ..tables import TableError
 from ..touch.texture import model as texture
 from ..touch.texture import train as texture_train
 from ..touch.texture.spectral import HAZARD, HAZARD_LEAST
@@ -22,7 +22,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "train", "learn from one folder per surface, one CSV per recording", EXAMPLE, train)
     p.add_argument("folder")
-    p.add_argument("--out", required=True, metavar="MODEL.JSON")
+    add_output(p, "--out", required=True, metavar="MODEL.JSON")
     p.add_argument("--method", choices=["naive-bayes", "default"], default="default", help=METHODS)
     p.add_argument("--window-ms", type=float, default=100.0, help="window to train for, of method default: %(default)s")
     text = "of a drive, with --tile-m: how often the surface changes; default: once in fifty windows"
@@ -62,8 +62,6 @@ def train(arguments: argparse.Namespace) -> int:
         model.save(arguments.out)
     except ValueError as error:
         raise TableError(arguments.folder, None, str(error)) from error
-    except OSError as error:
-        raise unwritable(arguments.out, error) from error
     print(f"{arguments.out}: {len(recordings)} classes: {', '.join(recordings)}")
     for line in report(model) if arguments.method == "default" else ():
         print(line)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from ..observation import ODOMETRY, TRUTH
+from ..outputs import put
 from ..scene import Scene
-from ..tables import unwritable
 from .filters import ESTIMATE, Estimate, Filter, SettingError, default_filter, filter_names, settings_list, to_estimate
 from .observations import Observations, observations_path, read_observations
 from .scoring import pose_errors
@@ -174,7 +174,4 @@ def write_estimates(path: str | Path, result: Run, observations: Observations) -
     """est.csv: one row per input row, in the same order."""
     answers = zip(observations.t_text, result.poses.tolist(), result.table["confidence"].tolist(), strict=True)
     lines = [f"{t_s},{x:.6f},{y:.6f},{theta:.6f},{share:.6f}" for t_s, (x, y, theta), share in answers]
-    try:
-        Path(path).write_text("\n".join([ESTIMATE_HEADER, *lines]) + "\n")
-    except OSError as error:
-        raise unwritable(path, error) from error
+    put(path, "\n".join([ESTIMATE_HEADER, *lines]) + "\n")

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from ..occupancy import FREE, SOLID, Pose, from_map
+from ..outputs import made
 from ..progress import bar
+from ..scene import HELD as HELD_BY_SCENE
 from ..scene import OBSERVATIONS, Arena, Prior, Robot, Scene, load_robot, write
-from ..tables import TableError, read_rows, unwritable
+from ..tables import TableError, read_rows
 from .filters import ESTIMATE
 from .map_scene import CELL_M, MapScene, map_scene
 from .mapper import PATCH_M, Mapper, Part, TouchMap
@@ -20,6 +22,7 @@ CHUNK = 100  # rows between two steps of the progress bar
 FACES, TILES, CORNERS, PARTS = "faces.csv", "tiles.csv", "corners.csv", "parts.csv"
 PART = "part-{}"  # folder of the map of a part before the last
 ESTIMATES, IMAGE, MAP, CELLS = "est.csv", "map.png", "map.yaml", "occupancy.npy"
+HELD = (*HELD_BY_SCENE, PART.format("*"), MAP, CELLS)  # what stands in a map's folder
 START_SIGMA = (0.02, 0.02, 0.03)  # of the first pose in prior.toml: m, m, rad
 GREYS = {FREE: 254, SOLID: 0}  # of ROS; any other cell is 205
 GREY_UNKNOWN = 205
@@ -112,19 +115,16 @@ def left_by(
     return Mapped(robot, textures, rows, table, step_us, *left, parts, frame)
 
 
-def write_map(folder: str | Path, mapped: Mapped) -> MapScene:
-    """Write the map of the last part, tables of parts and estimates, and each map before it to a folder of its own in there.
-    TableError when it cannot be."""
-    folder = Path(folder)
-    try:
-        made = _write_one(folder, mapped)
+def write_map(place: str | Path, mapped: Mapped, overwrite: bool = False) -> MapScene:
+    """Write the map of the last part, tables of parts and estimates, and each map before it to a folder of its own in there,
+    as one. OutputError when it cannot be."""
+    with made(place, overwrite, HELD) as folder:
+        scene = _write_one(folder, mapped)
         for earlier in mapped.before():
             _write_one(folder / PART.format(earlier.touched.frame), earlier)
         _write_table(folder / ESTIMATES, _estimates(mapped))
         _write_table(folder / PARTS, _parts(mapped))
-    except OSError as error:
-        raise unwritable(folder, error) from error
-    return made
+    return scene
 
 
 def _write_one(folder: Path, mapped: Mapped) -> MapScene:

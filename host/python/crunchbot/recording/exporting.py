@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..outputs import made
 from ..progress import bar
-from ..tables import unwritable
 from .table import AXES, ExportError, Table
 
 SLOW_S = 2.0  # an export that takes longer shows how far it is
@@ -18,17 +18,11 @@ ROWS_MOST = 1 << 16  # of a row group
 
 
 def export(table: Table, path: Path) -> None:
-    """Write the whole file, or none, in the format that its name ends in. ExportError: it is none of FORMATS; TableError: it cannot be written."""
+    """Write the whole file, or none, in the format that its name ends in. ExportError: it is none of FORMATS; OutputError: it cannot be written."""
     if path.suffix not in FORMATS:
         raise ExportError(f"{path}: not a format; end the name in {', '.join(FORMATS)}")
-    part = path.with_name(f".{path.stem}-part{path.suffix}")
-    try:
+    with made(path) as part:
         FORMATS[path.suffix](table, part)
-        part.replace(path)
-    except OSError as error:
-        raise unwritable(path, error) from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _progress(table: Table) -> bar:

@@ -13,6 +13,7 @@ from mcap import records
 from mcap.opcode import Opcode
 
 from ..errors import UserError
+from ..files import open_file
 from .salvage import MAGIC, Damaged, Found, Salvage, inner_records
 
 DAMAGE_MOST = 100  # lines of damaged places, and as many of what is lost by them
@@ -93,7 +94,7 @@ class McapFile:
         self._data_end: tuple[Found, int] | None = None  # with the checksum of all before it, 0 for none
         self._written: records.Statistics | None = None
         try:
-            self._file = open(path, "rb")  # noqa: SIM115 - closed by close()
+            self._file = open_file(path)
         except OSError as error:
             raise self._unreadable(error, "give a recording made by 'whisker record'") from error
         try:

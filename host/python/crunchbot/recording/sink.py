@@ -4,15 +4,15 @@ A write ends when the kernel has the data, fdatasync when the disk has them. A s
 thread waits for it, so that the process that records does not.
 """
 
-import contextlib
-import errno
 import os
 import stat
 import threading
+from contextlib import ExitStack
 from pathlib import Path
 from typing import BinaryIO
 
-from .mcapfile import RecordingError
+from ..errors import UserError
+from ..outputs import opened, sync_folder
 
 
 class Syncer:
@@ -52,30 +52,13 @@ class Syncer:
             self.error = error
 
 
-def sync_folder(folder: Path) -> None:
-    """Bring a directory to the disk, where one may open it and its file system can."""
-    with contextlib.suppress(PermissionError):
-        number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(number)
-        except OSError as error:
-            if error.errno != errno.EINVAL:
-                raise
-        finally:
-            os.close(number)
-
-
 class Sink:
     """A file that remembers up to where it is whole, and goes back there when the disk is full."""
 
     def __init__(self, path: str | Path, overwrite: bool):
-        """RecordingError when there is no such place, or something is there that must not be replaced."""
-        try:
-            self._file = open(path, "wb" if overwrite else "xb", buffering=0)  # noqa: SIM115 - closed by close()
-        except FileExistsError:
-            raise RecordingError(f"{path}: exists; choose another name, or --overwrite") from None
-        except OSError as error:
-            raise RecordingError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+        """OutputError when there is no such place, or something is there that must not be replaced. What is replaced stays there until all is settled."""
+        self._opened, self._settled = ExitStack(), False
+        self._file = self._opened.enter_context(opened(path, overwrite, binary=True))
         self._place = self._whole = 0
         is_file = stat.S_ISREG(os.fstat(self._file.fileno()).st_mode)  # pipes and devices know no fdatasync
         self._syncer = Syncer(self._file) if is_file else None
@@ -103,6 +86,7 @@ class Sink:
         if self._syncer:
             self._syncer.stop()
         self._raise()
+        self._settled = True
 
     def cut(self) -> None:
         """Give up what came after the last flush."""
@@ -113,7 +97,8 @@ class Sink:
         """Close, with what was written on the disk if that is to be had."""
         if self._syncer:
             self._syncer.stop()
-        self._file.close()
+        failed = None if self._settled else UserError()
+        self._opened.__exit__(failed and type(failed), failed, None)
 
     def _raise(self) -> None:
         if self._syncer and self._syncer.error:

@@ -15,7 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..files import open_file
 from ..nav.filters import COMPONENT, COMPONENTS_MOST
+from ..outputs import put
 from ..scene import Scene
 
 MAGIC, VERSION = b"whisker-checkpoint", 1
@@ -105,15 +107,13 @@ def _beliefs(counts: object, data: bytes) -> dict[str, np.ndarray]:
 
 def save(path: Path, reported: Checkpoint) -> None:
     """Put it in its place, whole or not at all. OSError when that cannot be done."""
-    fresh = path.with_name(f".{path.name}.new")
-    fresh.write_bytes(encode(reported))
-    fresh.replace(path)
+    put(path, encode(reported), sync=False)
 
 
 def load(path: Path) -> Checkpoint | None:
     """None: there is no file. CheckpointError for one that cannot be used."""
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(SIZE_MOST + 1)
     except FileNotFoundError:
         return None

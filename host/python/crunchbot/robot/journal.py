@@ -1,8 +1,8 @@
 """The rows that a mapper has taken, in a file: one that is begun anew takes them again and holds the same map.
 
 A line with name, version and the robot's digest; then a record a message: length of the payload and CRC-32 of all behind
-it (little-endian), the envelope, the payload as CDR. A record is written whole before the row counts; what a process that
-was killed has left of its last one is cut off.
+it (little-endian), the envelope, the payload as CDR. A record is written whole before the row counts. A file with
+more than whole records, as a process leaves it that was killed in the middle of one, is kept under another name.
 """
 
 import struct
@@ -10,6 +10,7 @@ import zlib
 from hashlib import sha256
 from pathlib import Path
 
+from ..outputs import put, put_aside
 from ..scene import Robot
 from .network.inbox import Received
 from .network.messages import MessageError, Observation, decode, encode
@@ -32,15 +33,14 @@ class Journal:
             return
         head = MAGIC + sha256(repr(robot).encode()).hexdigest().encode() + b"\n"
         try:
-            data = path.read_bytes() if path.exists() else b""
-            if data and not data.startswith(head):
-                self.note, data = f"{path}: not used: no journal of this robot; it is written anew", b""
-            self.taken, end = _read(data, len(head)) if data else ([], 0)
-            self._file = path.open("r+b" if data else "wb", buffering=0)
-            self._file.truncate(end)
-            self._file.seek(end)
-            if not data:
-                self._file.write(head)
+            data = path.read_bytes() if path.exists() else head
+            self.taken, end = _read(data, len(head)) if data.startswith(head) else ([], 0)
+            if end < len(data) and path.exists():
+                what = "its end" if end else "no journal of this robot"
+                self.note = f"{path}: not used: {what}; what it was is now {put_aside(path)}"
+            if end < len(data) or not path.exists():
+                put(path, data[:end] or head)
+            self._file = path.open("ab", buffering=0)
         except OSError as error:
             self._fail(error)
 

@@ -87,7 +87,7 @@ class MapperProcess:
         return reported | {"step_us": round(float(self._steps_us[-1].sum())) if self._steps_us else 0}
 
     def run(self, stop: threading.Event) -> dict[str, object]:
-        """Returns the counters. TableError when the map cannot be written."""
+        """Returns the counters. OutputError when the map cannot be written."""
         self._recall()
         self._link.announce()
         reason = "stopped"
@@ -200,7 +200,9 @@ class MapperProcess:
             self._scene.arena.textures,
         )
         rows = joined(self._rows)
-        write_map(self._settings.out, left_by(self._mapper, self._robot, textures, rows, table, step_us))
+        write_map(
+            self._settings.out, left_by(self._mapper, self._robot, textures, rows, table, step_us), overwrite=True
+        )
 
 
 def _component(estimate: np.ndarray) -> np.ndarray:

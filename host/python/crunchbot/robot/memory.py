@@ -13,6 +13,7 @@ import numpy as np
 from ..nav import filters
 from ..nav.filters import COMPONENT
 from ..occupancy import from_map
+from ..outputs import put_aside
 from ..pilot.states import EXPLORE_M_S, TURN_RAD_S
 from ..scene import Scene
 from . import checkpoint
@@ -39,10 +40,9 @@ class Memory:
             return None
         self._checked = True
         try:
-            reported = checkpoint.load(self._path)
+            reported = self._readable()
             if reported is None:
                 return None
-            self._check(reported)
             unknown_s = _unknown_s(reported, first)
         except CheckpointError as error:
             self.note = f"{self._path}: not used: {error}; it is written anew"
@@ -73,6 +73,18 @@ class Memory:
         for name in ("sigma_m", "sigma_rad"):
             kept[name] = np.maximum(kept[name], FINEST)
         return kept
+
+    def _readable(self) -> Checkpoint | None:
+        """The checkpoint; one that is none, or of another arena, robot or filter, makes way."""
+        try:
+            if reported := checkpoint.load(self._path):
+                self._check(reported)
+        except CheckpointError as error:
+            try:
+                raise CheckpointError(f"{error}; what it was is now {put_aside(self._path)}") from None
+            except OSError as refused:
+                raise CheckpointError(f"{error}; it cannot be kept ({refused.strerror})") from None
+        return reported
 
     def _check(self, reported: Checkpoint) -> None:
         if reported.scene != self._identity:

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..nav.localise import Estimate
 from ..observation import has_normals
+from ..outputs import put
 from ..scene import Prior, Scene
 from .memory import Memory
 from .network import belief, initial_pose
@@ -46,7 +47,7 @@ class Settings:
     """filters: the first one's pose is the robot's. out: folder of est_<filter>.csv; None: none is written.
 
     stay: go on after the end of a run, for the next. drill_step_s: every step takes at least so long, for drills.
-    checkpoint: file of what is believed, for who is begun anew; None: none is kept.
+    checkpoint: file of what is believed, for who is begun anew; None: none is kept. overwrite: files of `out` that are there.
     """
 
     filters: tuple[str, ...]
@@ -54,6 +55,7 @@ class Settings:
     stay: bool = False
     drill_step_s: float = 0.0
     checkpoint: Path | None = None
+    overwrite: bool = False
 
 
 class Navigator:
@@ -191,7 +193,8 @@ class Navigator:
         self._prior = CHECKPOINT if before else UNIFORM if resumed else SCENE_PRIOR
         scene = replace(self._scene, prior=Prior("uniform")) if resumed else self._scene
         self._tracks = [
-            Track(name, scene, out, stack, resumed, before.get(name), normals) for name in self._settings.filters
+            Track(name, scene, out, stack, resumed, before.get(name), normals, self._settings.overwrite)
+            for name in self._settings.filters
         ]
 
     def _answer(self, track: Track, step: Step, header: Header, estimate: Estimate) -> None:
@@ -205,4 +208,4 @@ class Navigator:
 
 def write_report(path: Path, counters: dict[str, object]) -> None:
     """Counters as JSON."""
-    path.write_text(json.dumps(counters, indent=1) + "\n")
+    put(path, json.dumps(counters, indent=1) + "\n")

@@ -7,6 +7,7 @@ from typing import TextIO
 import numpy as np
 
 from ..nav import localise
+from ..outputs import opened
 from ..scene import Scene
 from .network.rows import Step, time_text
 
@@ -25,6 +26,7 @@ class Track:
         resumed: bool = False,
         components: np.ndarray | None = None,
         normals: bool = False,
+        overwrite: bool = False,
     ):
         """`out`: the folder of the files, which `stack` closes; None: no files. resumed: go on behind what they hold.
 
@@ -34,7 +36,7 @@ class Track:
         self._poses = self._covariances = None
         if out is not None:
             self._poses, self._covariances = (
-                stack.enter_context(_opened(out / f"{kind}_{name}.csv", header, resumed)) for kind, header in FILES
+                _opened(out / f"{kind}_{name}.csv", header, resumed, overwrite, stack) for kind, header in FILES
             )
 
     def take(self, step: Step) -> localise.Estimate:
@@ -50,8 +52,8 @@ class Track:
         return estimate
 
 
-def _opened(path: Path, header: str, resumed: bool) -> TextIO:
-    file = path.open("a" if resumed else "w")
+def _opened(path: Path, header: str, resumed: bool, overwrite: bool, stack: ExitStack) -> TextIO:
+    file = stack.enter_context(path.open("a") if resumed else opened(path, overwrite))
     if file.tell() == 0:
         print(header, file=file, flush=True)
     return file

@@ -12,6 +12,7 @@ from whisker_protocol import LANES, LIMITS
 from ..bridge.ring import FRAME, Reader
 from ..errors import UserError
 from ..files import UnreadableError, read_toml
+from ..outputs import put
 from .contact import ONSET_COUNTS, Contact
 from .texture.spectral import SENSOR_STOPS
 
@@ -116,7 +117,7 @@ def write_rest(path: Path, rests: list[Rest], names: list[str]) -> None:
         pairs = [f"[{a:.2f}, {b:.2f}]" for a, b in (rest.mean, rest.noise)]
         lines += ["", "[[lane]]", f"lane = {rest.lane}", f'name = "{names[rest.lane]}"']
         lines += [f"rest = {pairs[0]}", f"noise = {pairs[1]}", f"good = {rest.good}", f"bad = {rest.bad}"]
-    path.write_text("\n".join(lines) + "\n")
+    put(path, "\n".join(lines) + "\n")
 
 
 def read_noise(path: Path) -> dict[int, np.ndarray]:
@@ -185,7 +186,7 @@ class ContactsFile:
 
     def __init__(self, path: Path, whisk_rad_s: float | None = None, node: int | None = None):
         """`node`: serial number of the node whose whisker it is."""
-        self._file = open(path, "w", newline="")  # noqa: SIM115 - closed by close()
+        self._file = open(path, "x", newline="")  # noqa: SIM115 - closed by close()
         self._rows = csv.writer(self._file)
         extra = {name: v for name, v in (("whisk_rad_s", whisk_rad_s), ("node", node)) if v is not None}
         self._extra = list(extra.values())

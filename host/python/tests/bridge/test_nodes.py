@@ -61,7 +61,7 @@ def test_a_model_keeps_its_node_and_is_refused_for_another(capsys, tmp_path, nam
         assert code == 0 and len(out.splitlines()) == 12
     code, out, err = run(capsys, "radial", "predict", model, other)
     assert code == 2 and out == "" and "node 23, but this is node 24's" in err and err.count("\n") == 1
-    assert run(capsys, "radial", "fit", unknown, "--out", model, "--model", name)[0] == 0
+    assert run(capsys, "radial", "fit", unknown, "--overwrite", "--out", model, "--model", name)[0] == 0
     assert radial.load(model).node is None and run(capsys, "radial", "predict", model, other)[0] == 0
 
 

@@ -203,7 +203,7 @@ def test_radial_learns_and_reports(capsys, tmp_path):
     assert code == 0 and [a["radius_mm"] for a in answers] == pytest.approx(radii, abs=0.1)
     assert answers[0]["type"] == "shaft" and answers[-1]["type"] == "tip"
     contacts.write_text("contact,radius_mm,t_s,x,y\n0,90,0,1,2\n")
-    code, _, err = run(capsys, "radial", "fit", contacts, "--out", model)
+    code, _, err = run(capsys, "radial", "fit", contacts, "--overwrite", "--out", model)
     assert code == 2 and "no contact has 8 rows with numbers" in err and err.count("\n") == 1
 
 
@@ -222,7 +222,16 @@ def test_an_occupancy_map_stands_beside_or_in_place_of_an_arena(folder, tmp_path
 
     def reported(name: str, *options) -> tuple[list[float], np.ndarray]:
         code, out, _ = run(
-            capsys, "localise", folder, "--filter", name, "--json", "--out", tmp_path / "est.csv", *options
+            capsys,
+            "localise",
+            folder,
+            "--filter",
+            name,
+            "--json",
+            "--overwrite",
+            "--out",
+            tmp_path / "est.csv",
+            *options,
         )
         assert code == 0
         errors = [value for key, value in json.loads(out).items() if "_error_" in key]

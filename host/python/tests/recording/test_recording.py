@@ -18,6 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from crunchbot.bridge.ring import Clock, Reader, RingError, Writer
 from crunchbot.native import lib
+from crunchbot.outputs import OutputError
 from crunchbot.recording import RecordingError, read
 from crunchbot.recording.mcapfile import McapFile
 from crunchbot.recording.messages import MessageError, decode_block, encode_block
@@ -266,7 +267,7 @@ def test_no_room_at_all_is_one_line():
 def test_an_existing_file_is_not_replaced_unasked(tmp_path):
     path = tmp_path / "a.mcap"
     write(path, make_frames(10))
-    with pytest.raises(RecordingError, match="exists; choose another name"):
+    with pytest.raises(OutputError, match="is there already; give --overwrite"):
         RecordingWriter(path, {})
     write(path, make_frames(20), overwrite=True)
     assert len(all_frames(path)) == 20

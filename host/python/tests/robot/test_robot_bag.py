@@ -245,7 +245,7 @@ def test_log_times_stay_what_a_file_can_hold_whatever_rows_are_stamped():
 def test_an_existing_bag_is_kept(tmp_path, capsys):
     (tmp_path / "a.mcap").write_text("dear")
     code, _, err = run(capsys, "bag", tmp_path / "a.mcap", "--connect", "none")
-    assert code == 2 and "exists; choose another name, or --overwrite" in err
+    assert code == 2 and "is there already; give --overwrite" in err
     assert (tmp_path / "a.mcap").read_text() == "dear"
 
 

@@ -218,10 +218,14 @@ def test_what_cannot_be_gone_on_from_is_said_in_one_line(made, tmp_path):
         (Memory(path, scene, NAMES), later(sent[9], AGE_MOST_S + 1.0), "61 s old, 60 s are the most"),
         (Memory(path, scene, NAMES), later(sent[9], 5.0, stream=8, stamp_s=0.1), "of an earlier run"),
     ]
+    data = path.read_bytes()
     for memory, first, why in cases:
+        path.write_bytes(data)
         assert memory.recall(first) is None
         assert why in memory.note and memory.note.startswith(f"{path}: not used: ") and "\n" not in memory.note
     assert Memory(path, scene, NAMES).recall(later(sent[9], AGE_MOST_S - 1.0))
+    aside = [path.with_name(f"{path.stem}-{number}{path.suffix}") for number in (2, 3)]
+    assert [file.read_bytes() for file in aside] == [data, data], "what is another's is not written over"
 
 
 def test_components_that_are_no_prior_are_not_gone_on_from(made, tmp_path):

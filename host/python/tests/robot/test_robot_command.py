@@ -143,7 +143,7 @@ def test_a_simulated_robot_learns_once_and_nothing_where_models_are_given(capsys
     common = ["robot", "--simulated", "--out", tmp_path / "out", "--first-port"]
     for options in ([], [], ["--models", tmp_path / "out/models"], ["--models", tmp_path]):
         run(capsys, *common, free_port(3), *options)
-    assert learnt == [tmp_path / "out/models"]
+    assert [models.name for models in learnt] == ["models"] and (tmp_path / "out/models/texture.json").exists()
     run(capsys, "robot", "--simulated", "--out", tmp_path / "again", "--first-port", free_port(3))
     assert len(learnt) == 1 and (tmp_path / "again/models/texture.json").read_text() == "1"
     run(capsys, "robot", "--simulated", "--seed", 2, "--out", tmp_path / "other", "--first-port", free_port(3))
@@ -322,8 +322,8 @@ def stand_ins(monkeypatch):
         command = [sys.executable, "-c", TELLS_TRUTH, meeting.simulation] if tells else ["sleep", "1000"]
         return Program.of(program.name, command, reports=program.reports)
 
-    def waiting(arguments, meeting):
-        table[:] = [stand_in(program, meeting) for program in made(arguments, meeting)]
+    def waiting(arguments, meeting, files):
+        table[:] = [stand_in(program, meeting) for program in made(arguments, meeting, files)]
         return table
 
     monkeypatch.setattr(robot, "_table", waiting)

@@ -84,11 +84,12 @@ def test_a_mapper_takes_the_navigators_place(trained, robot, tmp_path):
 def test_systemd_finds_nothing_wrong(trained, robot, tmp_path):
     if not (analyze := shutil.which("systemd-analyze")):
         pytest.skip("systemd-analyze is not installed")
+    units = tmp_path / "units"
+    written(robot, units, "--desktop")
     for name in ("whiskerd.service", "whisker-base@ttyUSB3.service"):
-        (tmp_path / name).write_text("[Service]\nExecStart=/bin/true\n")
-    written(robot, tmp_path, "--desktop")
-    paths = sorted(path for path in tmp_path.iterdir() if path.name.startswith("whisker-"))
-    environment = os.environ | {"SYSTEMD_UNIT_PATH": f"{tmp_path}:"}
+        (units / name).write_text("[Service]\nExecStart=/bin/true\n")
+    paths = sorted(path for path in units.iterdir() if path.name.startswith("whisker-"))
+    environment = os.environ | {"SYSTEMD_UNIT_PATH": f"{units}:"}
     done = subprocess.run([analyze, "verify", *paths], env=environment, capture_output=True, text=True)
     assert done.returncode == 0 and "whisker-" not in done.stderr, done.stderr
 

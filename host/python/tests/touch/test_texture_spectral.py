@@ -443,7 +443,7 @@ def test_training_is_for_the_window_asked_for(capsys, tmp_path):
     for name in ("VINYL", "ROUGH"):
         for n in range(3):
             write(tmp_path / "set" / name / f"{n}.csv", drag(name, 1000, n))
-    command = ["texture", "train", tmp_path / "set", "--out", tmp_path / "m.json", "--window-ms"]
+    command = ["texture", "train", tmp_path / "set", "--overwrite", "--out", tmp_path / "m.json", "--window-ms"]
     assert run(capsys, *command, "200", "--speed-m-s", "0.3", "--tile-m", "0.5")[0] == 0
     made = texture.load(tmp_path / "m.json")
     assert made.figures["window_samples"] == 400 and made.hazard == pytest.approx(0.12)
@@ -480,7 +480,7 @@ def test_channels_in_another_order_are_one_clear_line(capsys, tmp_path):
     write(swapped, drag("VINYL", 400, 1))
     assert run(capsys, "texture", "classify", model, swapped)[0] == 0
     swapped.write_text(swapped.read_text().replace("t_s,x,y", "t_s,y,x"))
-    for command in (("classify", model, swapped), ("train", tmp_path / "set", "--out", model)):
+    for command in (("classify", model, swapped), ("train", tmp_path / "set", "--overwrite", "--out", model)):
         code, _, error = run(capsys, "texture", *command)
         assert code != 0 and "1.csv, line 1: columns y, x; give x, y" in error and error.count("\n") == 1
 
@@ -550,7 +550,7 @@ def test_a_faulty_recording_is_named_with_what_is_wrong(capsys, tmp_path, fault)
         for n in range(2):
             write(tmp_path / "set" / name / f"{n}.csv", drag(name, 800, n))
     model, spoilt = tmp_path / "m.json", tmp_path / "set/VINYL/1.csv"
-    command = "texture", "train", tmp_path / "set", "--out", model
+    command = "texture", "train", tmp_path / "set", "--overwrite", "--out", model
     assert run(capsys, *command)[0] == 0
     spoil(spoilt)
     for words, wanted in ((("classify", model, spoilt), of_answer), (command[1:], of_training)):

@@ -17,12 +17,14 @@ import json
 import re
 import threading
 from collections.abc import Callable, Iterable
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
 import zenoh
 
 from ...errors import UserError
+from ...files import UnreadableError, read_text
 from .inbox import Inbox, Received, encoding_of
 from .messages import HEALTH, NAME, End, Header, encode, type_of
 from .sources import Sources
@@ -43,6 +45,9 @@ RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor":
 ENDPOINT = re.compile(r"(?:tcp|tls)/(\[[0-9a-fA-F:]+\]|[\w.-]+):(\d{1,5})")
 ALIVE, STREAM = "alive", "stream"  # keys of liveliness tokens: alive/<process>, stream/<number>/<topic>
 TOKEN = re.compile(r"([0-9a-f]{8})/(.+)")
+# zenoh's parser calls itself for every bracket, and ends the process where its stack does; its own configuration has eight
+# within each other. What lies in a text counts too: nobody writes so many there.
+NESTED_MOST = 64
 LOOPBACK = re.compile(r"(?:tcp|tls)/(127\.[\d.]+|\[::1\]|localhost):\d+")
 
 
@@ -204,9 +209,12 @@ def read_config(path: Path | None) -> zenoh.Config:
     if path is None:
         return zenoh.Config()
     try:
-        return zenoh.Config.from_json5(path.read_text())
-    except (OSError, UnicodeDecodeError, zenoh.ZError) as error:
-        why = error.strerror if isinstance(error, OSError) else " ".join(str(error).split())[:200]
+        text = read_text(path)
+        if max(accumulate((letter in "[{") - (letter in "]}") for letter in text), default=0) > NESTED_MOST:
+            raise UnreadableError(f"brackets within more than {NESTED_MOST} others")
+        return zenoh.Config.from_json5(text)
+    except (UnreadableError, zenoh.ZError) as error:
+        why = " ".join(str(error).split())[:200]
         raise NamingError(f"{path}: no configuration of zenoh ({why}); give a JSON5 file, see docs/remote.md") from None
 
 

@@ -7,15 +7,34 @@ from itertools import count
 from pathlib import Path
 from typing import TextIO
 
+from ...outputs import unwritable
 from ...stamping import stamp
 
 TAIL_BYTES = 4096
 OURS = "-- "  # begins what is not the process's own, behind the time
+# What a run leaves, by what it is; in place of {} its number, from the second run on
+FILES = {
+    "bag": "robot{}.mcap",
+    "map": "map{}",
+    "scene": "scene{}",
+    "flat": "scene{}.flat",
+    "truth": "truth{}.csv",
+    "wheels": "wheels{}.csv",
+}
 STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3} ")
 
 
+def run_files(folder: Path) -> dict[str, Path]:
+    """Places of FILES in this folder, all of one number, of which nothing is there."""
+    for number in count(1):
+        mark = "" if number == 1 else f"-{number}"
+        files = {what: folder / name.format(mark) for what, name in FILES.items()}
+        if not any(map(os.path.lexists, files.values())):
+            return files
+
+
 def run_folder(logs: Path) -> Path:
-    """A new folder of `logs`, named by the time of now."""
+    """A new folder of `logs`, named by the time of now. OutputError when there can be none."""
     name = time.strftime("%Y%m%d-%H%M%S")
     for number in count(1):
         folder = logs / (name if number == 1 else f"{name}-{number}")
@@ -23,6 +42,8 @@ def run_folder(logs: Path) -> Path:
             folder.mkdir(parents=True)
         except FileExistsError:
             continue
+        except OSError as error:
+            raise unwritable(folder, error) from error
         return folder
 
 

@@ -137,7 +137,7 @@ class Table:
         return [*whisker("navigator"), self.body.scene]
 
     def mapper(self, out: Path) -> list:
-        return [*whisker("mapper"), self.body.scene, "--out", out]
+        return [*whisker("mapper"), self.body.scene, "--out", out, "--overwrite"]
 
     def bag(self, file: Path) -> list:
         return [*whisker("bag"), file, "--scene", self.body.scene]

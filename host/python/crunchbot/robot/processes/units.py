@@ -11,6 +11,7 @@ from .children import Program
 from .parts import Meeting
 
 TARGET = "whisker-robot.target"
+HELD = (TARGET, "whisker-*.service")  # what stands in a folder of units
 WATCHDOG_S = {"pilot": 2, "navigator": 10, "mapper": 10, "bag": 10}  # the view has no such loop
 UNIT = """\
 [Unit]

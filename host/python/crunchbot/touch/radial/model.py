@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ...fields import Fields
 from ...files import read_json
 from ...native import as_doubles, doubles, ffi, lib
+from ...outputs import put
 from ...tables import TableError, Warn, ignore, numbers, read_columns
 from .curve import CurveModel, Known, radii_of
 from .faults import faulty, radii_of_contacts
@@ -274,7 +275,7 @@ def save(model: Any, path: str | Path) -> None:
     """Write a model of any kind as JSON."""
     formats = {RadialModel: FORMAT, WhiskModel: WHISK_FORMAT, CurveModel: CURVE_FORMAT, PressModel: PRESS_FORMAT}
     node = {} if model.node is None else {NODE_COLUMN: model.node}
-    Path(path).write_text(json.dumps({"format": formats[type(model)]} | node | model.content, indent=1) + "\n")
+    put(path, json.dumps({"format": formats[type(model)]} | node | model.content, indent=1) + "\n")
 
 
 def load(path: str | Path) -> "RadialModel | CurveModel | WhiskModel | PressModel":

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ...fields import Fields
 from ...files import UnreadableError, read_json
 from ...native import as_doubles, lib
+from ...outputs import put
 from ...tables import TableError, Warn, ignore, numbers, read_columns
 from .spectral import FORMAT as SPECTRAL_FORMAT
 from .spectral import SENSOR_STOPS, SpectralModel, no_model
@@ -82,7 +83,7 @@ class TextureModel:
         content = {"format": FORMAT, "classes": self.classes}
         content |= {key: getattr(self, key).tolist() for key in ("rest", "low", "high")}
         content["loglik"] = np.round(self.table, 6).tolist()
-        Path(path).write_text(json.dumps(content) + "\n")
+        put(path, json.dumps(content) + "\n")
 
     @classmethod
     def from_json(cls, path: str | Path, content: object) -> "TextureModel":

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...fields import Fields
 from ...native import as_doubles, doubles, ffi, lib
+from ...outputs import put
 from ...tables import TableError
 from .change import Change
 from .classifier import Classifier
@@ -96,7 +97,7 @@ class SpectralModel:
             part = getattr(self, name)
             content[name] = None if part is None else _fields(part)
         content["classifiers"] = [_fields(r) | {"span": _listed(r.span)} for r in self.classifiers]
-        Path(path).write_text(json.dumps(content) + "\n")
+        put(path, json.dumps(content) + "\n")
 
     def check(self) -> None:
         """ValueError when parts of the model differ in size."""
