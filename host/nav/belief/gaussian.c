@@ -52,12 +52,11 @@ struct nav_gaussian nav_gaussian_sum_moments(const struct nav_gaussian_sum *s)
     return g;
 }
 
-void nav_gaussian_ahead(const struct nav_gaussian *g, const struct nav_pending *pending, struct nav_estimate *estimate)
+void nav_gaussian_covariance(const struct nav_gaussian *g, struct nav_pose about, double out[9])
 {
-    struct nav_gaussian now = *g;
-    nav_gaussian_move(&now, pending->step, &pending->noise);
-    estimate->pose = now.mean;
-    memcpy(estimate->covariance, now.covariance, sizeof now.covariance);
+    const double off[3] = {g->mean.x - about.x, g->mean.y - about.y, nav_wrap(g->mean.theta - about.theta)};
+    for (int k = 0; k < 9; k++)
+        out[k] = g->covariance[k] + off[k / 3] * off[k % 3];
 }
 
 void nav_gaussian_root(const double p[9], double root[9])
@@ -76,12 +75,15 @@ struct nav_pose nav_gaussian_at(const struct nav_gaussian *g, const double l[9],
 
 enum { ACROSS = 25, TURNS = 7 }; /* points of the whitened lattice along an axis */
 
-/* Mass of each of `points` whitened lattice points, which reach to 3 standard deviations. */
-static void gaussian_shares(int points, double *share)
+/* Headings are few: kernels half as wide as their spacing leave 1 % of a ripple. */
+static const double TURN_KERNEL = 0.5;
+
+/* Mass of each of `points` whitened lattice points, which reach to 3 standard deviations and have `variance`. */
+static void gaussian_shares(int points, double variance, double *share)
 {
     double total = 0.0, half = (points - 1) / 2.0;
     for (int k = 0; k < points; k++) {
-        share[k] = exp(-4.5 * (k - half) * (k - half) / (half * half));
+        share[k] = exp(-4.5 / variance * (k - half) * (k - half) / (half * half));
         total += share[k];
     }
     for (int k = 0; k < points; k++)
@@ -93,15 +95,15 @@ long nav_gaussian_components(const struct nav_gaussian *g, struct nav_component 
     enum { ALL = ACROSS * ACROSS * TURNS };
     double l[9], share[ACROSS], share_turn[TURNS], spacing = 6.0 / (ACROSS - 1), spacing_turn = 6.0 / (TURNS - 1);
     nav_gaussian_root(g->covariance, l);
-    gaussian_shares(ACROSS, share);
-    gaussian_shares(TURNS, share_turn);
+    gaussian_shares(ACROSS, 1.0, share);
+    gaussian_shares(TURNS, 1.0 - TURN_KERNEL * TURN_KERNEL * spacing_turn * spacing_turn, share_turn);
     for (int n = 0; n < ALL && n < room; n++) {
         int i = n / TURNS / ACROSS, j = n / TURNS % ACROSS, k = n % TURNS;
         const double z[3] = {spacing * (i - ACROSS / 2), spacing * (j - ACROSS / 2), spacing_turn * (k - TURNS / 2)};
         out[n] = (struct nav_component){
             .pose = nav_gaussian_at(g, l, z),
             .sigma_m = spacing / sqrt(12.0) * fmax(hypot(l[0], l[3]), l[4]), /* no gaps along the long axis */
-            .sigma_rad = spacing_turn / sqrt(12.0) * l[8],
+            .sigma_rad = TURN_KERNEL * spacing_turn * l[8],
             .mass = share[i] * share[j] * share_turn[k],
         };
     }
@@ -140,19 +142,88 @@ bool nav_gaussian_invert(const double c[9], double out[9])
     return true;
 }
 
+/* Mass of a normal distribution within `half` a width of an angle `off` from its mean, all turns taken together. */
+static double gaussian_turned(double off, double half, double sigma)
+{
+    double root = fmax(sigma, 1e-9) * sqrt(2.0), sum = 0.0;
+    if (fabs(off) + NAV_COMPONENT_REACH * sigma < half)
+        return 1.0;
+    if (sigma > NAV_PI) /* as good as even: its first harmonic is 1 % */
+        return half / NAV_PI;
+    for (int turn = -1; turn <= 1; turn++) {
+        double centre = nav_wrap(off) + 2.0 * NAV_PI * turn;
+        sum += 0.5 * (erf((centre + half) / root) - erf((centre - half) / root));
+    }
+    return sum;
+}
+
+/* Mass of a round normal distribution within NAV_NEAR_M of a point. Narrow: the circle's edge is nearly straight. Wide:
+ * the non-central chi-squared distribution of two degrees of freedom, a Poisson mixture of central ones. */
+static double gaussian_within(double square, double sigma)
+{
+    double far = sqrt(square), share = 0.5 * square / (sigma * sigma), sum = 0.0;
+    if (fabs(far - NAV_NEAR_M) > NAV_COMPONENT_REACH * sigma)
+        return far < NAV_NEAR_M ? 1.0 : 0.0;
+    if (sigma < NAV_NEAR_M / 8.0) /* within 0.001 */
+        return 0.5 * erfc((sqrt(square + sigma * sigma) - NAV_NEAR_M) / (sigma * sqrt(2.0)));
+    double edge = 0.5 * NAV_NEAR_M * NAV_NEAR_M / (sigma * sigma), poisson = exp(-share), term = exp(-edge);
+    double within = 1.0 - term;
+    for (int j = 1; within > 1e-4; j++) {
+        sum += poisson * within;
+        poisson *= share / j;
+        term *= edge / j;
+        within -= term;
+    }
+    return sum;
+}
+
+double nav_component_near(double square, double turn, double sigma_m, double sigma_rad)
+{
+    double within = gaussian_within(square, sigma_m);
+    return within > 0.0 ? within * gaussian_turned(turn, NAV_NEAR_RAD, sigma_rad) : 0.0;
+}
+
+/* Points of a midpoint rule. */
+enum { POINTS = 16 };
+
+/* Mass within `radius` of the origin of a normal about (x, y) with covariance xx, xy, yy: along its long axis by
+ * points, across by the error function. */
+static double gaussian_disc(double x, double y, double xx, double xy, double yy, double radius)
+{
+    double turned = 0.5 * atan2(2.0 * xy, xx - yy), c = cos(turned), s = sin(turned), sum = 0.0;
+    double along = sqrt(fmax(c * c * xx + 2.0 * c * s * xy + s * s * yy, 1e-18));
+    double across = sqrt(fmax(s * s * xx - 2.0 * c * s * xy + c * c * yy, 1e-18)) * sqrt(2.0);
+    double u = c * x + s * y, v = c * y - s * x;
+    double low = fmax(-radius, u - NAV_COMPONENT_REACH * along), high = fmin(radius, u + NAV_COMPONENT_REACH * along);
+    if (!(low < high))
+        return 0.0;
+    double first = asin(low / radius), step = (asin(high / radius) - first) / POINTS;
+    for (int n = 0; n < POINTS; n++) {
+        double at = radius * sin(first + (n + 0.5) * step), half = radius * cos(first + (n + 0.5) * step);
+        double z = (at - u) / along;
+        sum += half * exp(-0.5 * z * z) * (erf((half - v) / across) + erf((half + v) / across));
+    }
+    return sum * step / (along * sqrt(8.0 * NAV_PI));
+}
+
+/* Headings by points: each has the positions that go with it. */
 double nav_gaussian_mass(const struct nav_gaussian *g, double radius, double angle)
 {
-    enum { DIRECTIONS = 32 };
-    const double *p = g->covariance, turned = erf(angle / sqrt(2.0 * fmax(p[8], 1e-18)));
-    if (radius * radius > 50.0 * (p[0] + p[4])) /* less than e^-25 is farther off, whatever the direction */
-        return turned;
-    double root[9], mass = 0.0;
-    nav_gaussian_root(p, root);
-    /* A standard normal in polar coordinates: along each direction the whitened radius is Rayleigh distributed. */
-    for (int i = 0; i < DIRECTIONS; i++) {
-        double u = cos(NAV_PI * i / DIRECTIONS), v = sin(NAV_PI * i / DIRECTIONS);
-        double stretch = hypot(root[0] * u, root[3] * u + root[4] * v);
-        mass += -expm1(-0.5 * radius * radius / (stretch * stretch)) / DIRECTIONS;
+    const double *p = g->covariance, sigma = sqrt(fmax(p[8], 1e-18));
+    if (NAV_COMPONENT_REACH * sqrt(p[0] + p[4]) < radius &&
+        NAV_COMPONENT_REACH * sigma < angle) /* all but 3e-4 of it */
+        return 1.0;
+    if (sigma > NAV_PI) /* all headings are as likely, wherever they lead */
+        return gaussian_disc(0.0, 0.0, p[0], p[1], p[4], radius) * angle / NAV_PI;
+    double sum = 0.0, a = p[2] / sigma, b = p[5] / sigma;
+    for (int turn = -1; turn <= 1; turn++) {
+        double low = fmax((2.0 * NAV_PI * turn - angle) / sigma, -NAV_COMPONENT_REACH);
+        double step = (fmin((2.0 * NAV_PI * turn + angle) / sigma, NAV_COMPONENT_REACH) - low) / POINTS;
+        for (int n = 0; n < POINTS && step > 0.0; n++) {
+            double z = low + (n + 0.5) * step,
+                   mass = erf((z + step / 2.0) / sqrt(2.0)) - erf((z - step / 2.0) / sqrt(2.0));
+            sum += 0.5 * mass * gaussian_disc(a * z, b * z, p[0] - a * a, p[1] - a * b, p[4] - b * b, radius);
+        }
     }
-    return mass * turned;
+    return fmin(sum, 1.0);
 }

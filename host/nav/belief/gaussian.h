@@ -12,12 +12,6 @@ struct nav_gaussian {
     double covariance[9];
 };
 
-/* What a belief amounts to. near: mass within NAV_NEAR_M and NAV_NEAR_RAD of the mean. */
-struct nav_summary {
-    struct nav_gaussian belief; /* mean near a mode; covariance of the whole belief about it */
-    double near;
-};
-
 /* A mode of a belief, and how far a pose is from it: squared distance and angle by NAV_NEAR_M and NAV_NEAR_RAD. What is
  * farther than NAV_MODE_REACH does not belong to it. */
 enum { NAV_MODES_MOST = 32 };
@@ -48,8 +42,13 @@ void nav_gaussian_sum_add(struct nav_gaussian_sum *, double mass, const struct n
 /* Mean and covariance of the mixture; its mass must be above 0. */
 struct nav_gaussian nav_gaussian_sum_moments(const struct nav_gaussian_sum *);
 
-/* Pose and covariance once the motion put off is done. */
-void nav_gaussian_ahead(const struct nav_gaussian *, const struct nav_pending *, struct nav_estimate *);
+/* Mass of a component (nav_filter_components) within NAV_NEAR_M and NAV_NEAR_RAD of a pose: its distance from there,
+ * squared, and the angle. Beyond NAV_COMPONENT_REACH standard deviations it holds nothing. */
+#define NAV_COMPONENT_REACH 4.0
+double nav_component_near(double square, double turn, double sigma_m, double sigma_rad);
+
+/* Covariance about another pose than the mean. */
+void nav_gaussian_covariance(const struct nav_gaussian *, struct nav_pose about, double out[9]);
 
 /* The belief as a lattice of components, as nav_filter_components says. */
 long nav_gaussian_components(const struct nav_gaussian *, struct nav_component *out, long room);
@@ -67,7 +66,7 @@ struct nav_pose nav_gaussian_at(const struct nav_gaussian *, const double root[9
 /* Inverse of a covariance; false when it is not positive definite (out is then untouched). */
 bool nav_gaussian_invert(const double covariance[9], double out[9]);
 
-/* Belief mass within `radius` m and `angle` rad of the mean, the heading taken as independent of the position. */
+/* Belief mass within `radius` m and `angle` rad of the mean, headings a turn apart being the same. */
 double nav_gaussian_mass(const struct nav_gaussian *, double radius, double angle);
 
 #endif

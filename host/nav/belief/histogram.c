@@ -143,7 +143,8 @@ static int histogram_cells_init(struct nav_cells *c, const struct nav_shape *fin
     c->first = calloc(histogram_shape_lines(finest) + 1, sizeof *c->first);
     c->at = calloc(room, sizeof *c->at);
     c->mass = calloc((size_t)room * NAV_LANES, sizeof *c->mass);
-    return c->shift_x && c->shift_y && c->first && c->at && c->mass ? 0 : -1;
+    c->moment = calloc((size_t)finest->nh, sizeof *c->moment);
+    return c->moment && c->shift_x && c->shift_y && c->first && c->at && c->mass ? 0 : -1;
 }
 
 static void histogram_cells_free(struct nav_cells *c)
@@ -153,6 +154,7 @@ static void histogram_cells_free(struct nav_cells *c)
     free(c->first);
     free(c->at);
     free(c->mass);
+    free(c->moment);
 }
 
 static int histogram_line_init(struct nav_line *line, const struct nav_shape *finest)
@@ -188,9 +190,8 @@ int nav_histogram_init(struct nav_histogram *h, const struct nav_levels *levels,
     if (room > UINT32_MAX / 2 || finest.groups > UINT16_MAX)
         return -1;
     h->room = (uint32_t)room;
-    h->moment = calloc((size_t)finest.nh, sizeof *h->moment);
-    if (!h->moment || histogram_cells_init(&h->now, &finest, h->room) ||
-        histogram_cells_init(&h->next, &finest, h->room) || histogram_pass_init(h, &finest))
+    if (histogram_cells_init(&h->now, &finest, h->room) || histogram_cells_init(&h->next, &finest, h->room) ||
+        histogram_pass_init(h, &finest))
         return -1;
     nav_histogram_restart(h, level);
     return 0;
@@ -206,7 +207,6 @@ void nav_histogram_free(struct nav_histogram *h)
             histogram_line_free(&h->pass->blurred[n]);
     }
     free(h->pass);
-    free(h->moment);
     histogram_cells_free(&h->now);
     histogram_cells_free(&h->next);
 }
@@ -227,7 +227,7 @@ void nav_histogram_clear(struct nav_histogram *h, int level)
     memset(h->now.shift_x, 0, (size_t)h->shape.nh * sizeof *h->now.shift_x);
     memset(h->now.shift_y, 0, (size_t)h->shape.nh * sizeof *h->now.shift_y);
     memset(h->now.first, 0, (histogram_shape_lines(&h->shape) + 1) * sizeof *h->now.first);
-    memset(h->moment, 0, (size_t)h->shape.nh * sizeof *h->moment);
+    memset(h->now.moment, 0, (size_t)h->shape.nh * sizeof *h->now.moment);
 }
 
 void nav_histogram_restart(struct nav_histogram *h, int level)
@@ -235,6 +235,13 @@ void nav_histogram_restart(struct nav_histogram *h, int level)
     nav_histogram_clear(h, level);
     h->uniform = true;
     h->total = 1.0;
+    h->about = (struct nav_pose){0.0, 0.0, 0.0};
+    double x = h->shape.nx * h->shape.cell, y = h->shape.ny * h->shape.cell;
+    const double even[NAV_MOMENTS] = {1.0, x / 2.0, y / 2.0, x * x / 3.0, x * y / 4.0, y * y / 3.0};
+    for (int p = 0; p < h->shape.nh; p++) {
+        for (int k = 0; k < NAV_MOMENTS; k++)
+            h->now.moment[p][k] = even[k] / h->shape.nh;
+    }
 }
 
 static void histogram_store_begin(struct nav_histogram *h)
@@ -260,6 +267,7 @@ static void histogram_copy_place(struct nav_histogram *h)
     h->next.rotation = h->now.rotation;
     memcpy(h->next.shift_x, h->now.shift_x, (size_t)h->shape.nh * sizeof *h->now.shift_x);
     memcpy(h->next.shift_y, h->now.shift_y, (size_t)h->shape.nh * sizeof *h->now.shift_y);
+    memcpy(h->next.moment, h->now.moment, (size_t)h->shape.nh * sizeof *h->now.moment);
 }
 
 /* Stores a line written out, and empties it. */
@@ -335,6 +343,11 @@ void nav_histogram_add(struct nav_histogram *h, struct nav_grain *grain, int32_t
         grain[n].next = (int32_t)h->next.first[at + 1] - 1;
         h->next.first[at + 1] = (uint32_t)n + 1;
         h->total += grain[n].mass;
+        double x = grain[n].pose.x - h->about.x, y = grain[n].pose.y - h->about.y,
+               *m = h->next.moment[at / h->shape.ny];
+        const double parts[NAV_MOMENTS] = {1.0, x, y, x * x, x * y, y * y};
+        for (int k = 0; k < NAV_MOMENTS; k++)
+            m[k] += grain[n].mass * parts[k];
     }
     for (size_t number = 0; number < lines; number++) {
         histogram_write_out(h, number, line);
@@ -389,9 +402,9 @@ bool nav_histogram_refine(struct nav_histogram *h)
             histogram_store_line(h, &h->pass->raw, (size_t)q * (size_t)finer.ny + (size_t)j);
         }
     }
-    for (int q = finer.nh; q-- > 0;) {
+    for (int q = 0; q < finer.nh; q++) {
         for (int k = 0; k < NAV_MOMENTS; k++)
-            h->moment[q][k] = h->moment[q / turns][k] / turns;
+            h->next.moment[q][k] = h->now.moment[q / turns][k] / turns;
     }
     h->heaviest *= 0.25f / (float)turns;
     h->cells *= 4L * turns;
@@ -648,7 +661,7 @@ static void histogram_pass_begin_slice(struct nav_histogram *h)
 {
     struct nav_pass *p = h->pass;
     int extent[2];
-    memset(h->moment[p->at.slice], 0, sizeof h->moment[p->at.slice]);
+    memset(h->next.moment[p->at.slice], 0, sizeof h->next.moment[p->at.slice]);
     histogram_pass_extent(h, extent);
     p->at.line = 0;
     p->at.end = extent[1];
@@ -755,7 +768,7 @@ static void histogram_pass_close(struct nav_histogram *h)
 {
     struct nav_pass *p = h->pass;
     size_t number = (size_t)p->at.slice * (size_t)h->shape.ny + (size_t)p->at.line;
-    double sum[3] = {0.0}, *m = h->moment[p->at.slice];
+    double sum[3] = {0.0}, *m = h->next.moment[p->at.slice];
     double y = (p->at.line + 0.5) * h->shape.cell + h->next.shift_y[p->at.slice] - p->about.y;
     for (int k = 0; k < 3; k++) {
         for (int n = 0; n < NAV_LANES; n++)

@@ -49,10 +49,11 @@ double nav_shape_inside(const struct nav_shape *);
  * shift_y[p]), its heading is (p + 1/2) cell_theta + rotation. */
 struct nav_cells {
     double rotation;
-    double *shift_x, *shift_y; /* [nh] m, within half a cell */
-    uint32_t *first;           /* [nh * ny + 1] groups of line n: first[n] .. first[n + 1] - 1 */
-    uint16_t *at;              /* [room] a group's place in its line */
-    float *mass;               /* [room][NAV_LANES] */
+    double *shift_x, *shift_y;     /* [nh] m, within half a cell */
+    uint32_t *first;               /* [nh * ny + 1] groups of line n: first[n] .. first[n + 1] - 1 */
+    uint16_t *at;                  /* [room] a group's place in its line */
+    float *mass;                   /* [room][NAV_LANES] */
+    double (*moment)[NAV_MOMENTS]; /* [nh] relative to `about` of the histogram */
 };
 
 /* What a pass does besides moving. */
@@ -78,12 +79,11 @@ struct nav_histogram {
     struct nav_pass *pass;
     double pending_position, pending_heading; /* variance not yet added, m^2 per axis, rad^2 */
     /* What the last pass found: */
-    double (*moment)[NAV_MOMENTS]; /* [nh] relative to */
-    struct nav_pose about;         /* this place */
-    double total;                  /* mass of all cells, in the cells' unit; */
-    long cells;                    /* those that hold any */
-    struct nav_pose mode;          /* centre of the heaviest cell, */
-    float heaviest;                /* and what it holds */
+    struct nav_pose about; /* near it */
+    double total;          /* mass of all cells, in the cells' unit; */
+    long cells;            /* those that hold any */
+    struct nav_pose mode;  /* centre of the heaviest cell, */
+    float heaviest;        /* and what it holds */
 };
 
 /* Begins uniform at level `level`, whose cells there is room for, and `spare` more. 0, or -1 without memory or when
@@ -146,6 +146,9 @@ void nav_histogram_each(const struct nav_histogram *, void (*take)(void *, struc
 long nav_histogram_components(const struct nav_histogram *, const struct nav_pending *, double mass,
                               struct nav_component *out, long room);
 
+/* Mass of those components within NAV_NEAR_M and NAV_NEAR_RAD of a pose; all of them have 1. */
+double nav_histogram_within(const struct nav_histogram *, const struct nav_pending *, struct nav_pose);
+
 /* Poses drawn systematically, evenly within their cells: at most `room`, about `count`. */
 long nav_histogram_draw(const struct nav_histogram *, struct nav_rng *, long count, struct nav_pose *out, long room);
 
@@ -153,8 +156,10 @@ long nav_histogram_draw(const struct nav_histogram *, struct nav_rng *, long cou
  * pose, when not NULL and there is any. */
 double nav_histogram_near(const struct nav_histogram *, struct nav_pose, struct nav_pose *mean);
 
-/* The belief as one Gaussian: the mean near its mode and the covariance of all of it about that, the spread within a
- * cell included. Returns the mass near the mean. Of a belief with mass. */
-double nav_histogram_summarise(const struct nav_histogram *, struct nav_gaussian *out);
+/* Of a belief with mass: the mean near its mode; returns the share near the mean, centres of cells deciding. */
+double nav_histogram_mode(const struct nav_histogram *, struct nav_pose *mean);
+
+/* Covariance about a pose of a belief with mass, moved by what is pending. */
+void nav_histogram_covariance(const struct nav_histogram *, const struct nav_pending *, struct nav_pose, double out[9]);
 
 #endif

@@ -63,13 +63,19 @@ static void histogram_list_take(void *self, struct nav_pose at, double mass)
     l->count++;
 }
 
+/* One cell as a component, but for pose and mass. */
+static struct nav_component histogram_kernel(const struct nav_histogram *h, const struct nav_pending *pending)
+{
+    double cell = h->shape.cell, turn = h->shape.cell_theta;
+    return (struct nav_component){.sigma_m = sqrt(cell * cell / 12.0 + h->pending_position + pending->noise.position),
+                                  .sigma_rad = sqrt(turn * turn / 12.0 + h->pending_heading + pending->noise.heading)};
+}
+
 long nav_histogram_components(const struct nav_histogram *h, const struct nav_pending *pending, double mass,
                               struct nav_component *out, long room)
 {
     struct listing l = {.out = out, .step = pending->step, .scale = mass / h->total, .room = room};
-    double cell = h->shape.cell, turn = h->shape.cell_theta;
-    l.each.sigma_m = sqrt(cell * cell / 12.0 + h->pending_position + pending->noise.position);
-    l.each.sigma_rad = sqrt(turn * turn / 12.0 + h->pending_heading + pending->noise.heading);
+    l.each = histogram_kernel(h, pending);
     nav_histogram_each(h, histogram_list_take, &l);
     return l.count;
 }
@@ -112,6 +118,41 @@ double nav_histogram_near(const struct nav_histogram *h, struct nav_pose pose, s
     return near.mass;
 }
 
+/* Mass of cells within reach of a pose that is taken back to where they were. */
+struct within {
+    struct nav_component each;
+    struct nav_pose pose;
+    double turn, mass;
+};
+
+static void histogram_within_take(void *self, struct nav_pose at, double mass)
+{
+    struct within *w = self;
+    double x = at.x - w->pose.x, y = at.y - w->pose.y;
+    w->mass += mass * nav_component_near(x * x + y * y, w->turn, w->each.sigma_m, w->each.sigma_rad);
+}
+
+double nav_histogram_within(const struct nav_histogram *h, const struct nav_pending *pending, struct nav_pose pose)
+{
+    struct within within = {.each = histogram_kernel(h, pending)};
+    const struct visit v = {h, histogram_within_take, &within};
+    for (int p = 0; p < h->shape.nh && h->total > 0.0; p++) {
+        double heading = histogram_stats_heading(h, p);
+        within.turn = nav_wrap(heading + pending->step.theta - pose.theta);
+        if (fabs(within.turn) > NAV_NEAR_RAD + NAV_COMPONENT_REACH * within.each.sigma_rad)
+            continue;
+        const struct nav_pose moved = nav_compose((struct nav_pose){0.0, 0.0, heading}, pending->step);
+        within.pose = (struct nav_pose){pose.x - moved.x, pose.y - moved.y, 0.0};
+        double at = (within.pose.y - h->now.shift_y[p]) / h->shape.cell;
+        double reach = (NAV_NEAR_M + NAV_COMPONENT_REACH * within.each.sigma_m) / h->shape.cell;
+        int begin = (int)fmax(fmin(floor(at - reach), h->shape.ny), 0.0);
+        int end = (int)fmax(fmin(ceil(at + reach) + 1.0, h->shape.ny), 0.0);
+        for (int j = begin; j < end; j++)
+            histogram_visit_line(&v, p, j);
+    }
+    return h->total > 0.0 ? fmin(within.mass / h->total, 1.0) : 0.0;
+}
+
 /* Adds one slice's moments about (x, y) to sums xx, xy, yy, xt, yt, tt, its heading being off by `turn`. */
 static void histogram_add_moments(const double m[NAV_MOMENTS], double x, double y, double turn, double sums[6])
 {
@@ -124,22 +165,38 @@ static void histogram_add_moments(const double m[NAV_MOMENTS], double x, double 
     sums[5] += m[0] * turn * turn;
 }
 
-double nav_histogram_summarise(const struct nav_histogram *h, struct nav_gaussian *out)
+/* Covariance about a pose once the cells have moved, that within a cell and noise left out. */
+static void histogram_moved(const struct nav_histogram *h, struct nav_pose step, struct nav_pose pose, double out[9])
 {
-    double sums[6] = {0.0}, within = h->shape.cell * h->shape.cell / 12.0;
-    double within_theta = h->shape.cell_theta * h->shape.cell_theta / 12.0;
-    out->mean = h->mode;
-    nav_histogram_near(h, h->mode, &out->mean);
-    for (int p = 0; p < h->shape.nh; p++)
-        histogram_add_moments(h->moment[p], out->mean.x - h->about.x, out->mean.y - h->about.y,
-                              nav_wrap(histogram_stats_heading(h, p) - out->mean.theta), sums);
+    double sums[6] = {0.0};
+    for (int p = 0; p < h->shape.nh; p++) {
+        const struct nav_pose moved =
+            nav_compose((struct nav_pose){h->about.x, h->about.y, histogram_stats_heading(h, p)}, step);
+        histogram_add_moments(h->now.moment[p], pose.x - moved.x, pose.y - moved.y, nav_wrap(moved.theta - pose.theta),
+                              sums);
+    }
     for (int k = 0; k < 6; k++)
         sums[k] /= h->total;
-    const double all[9] = {fmax(sums[0], 0.0) + within, sums[1], sums[3], sums[1],
-                           fmax(sums[2], 0.0) + within, sums[4], sums[3], sums[4],
-                           sums[5] + within_theta};
-    memcpy(out->covariance, all, sizeof all);
-    return nav_histogram_near(h, out->mean, NULL);
+    const double all[9] = {
+        fmax(sums[0], 0.0), sums[1], sums[3], sums[1], fmax(sums[2], 0.0), sums[4], sums[3], sums[4], sums[5]};
+    memcpy(out, all, sizeof all);
+}
+
+void nav_histogram_covariance(const struct nav_histogram *h, const struct nav_pending *pending, struct nav_pose pose,
+                              double out[9])
+{
+    const struct nav_component each = histogram_kernel(h, pending);
+    histogram_moved(h, pending->step, pose, out);
+    out[0] += each.sigma_m * each.sigma_m;
+    out[4] += each.sigma_m * each.sigma_m;
+    out[8] += each.sigma_rad * each.sigma_rad;
+}
+
+double nav_histogram_mode(const struct nav_histogram *h, struct nav_pose *mean)
+{
+    *mean = h->mode;
+    nav_histogram_near(h, h->mode, mean);
+    return fmin(nav_histogram_near(h, *mean, NULL) / h->total, 1.0);
 }
 
 struct draw {

@@ -100,7 +100,7 @@ long nav_bins_needed(const struct nav_bins *b, const struct nav_sample *sample, 
     return (long)fmax(ceil(count), (double)sample->least);
 }
 
-struct nav_summary nav_particles_summary(const struct nav_particles *p, struct nav_bins *b, struct nav_pose guess)
+struct nav_mode nav_particles_summary(const struct nav_particles *p, struct nav_bins *b, struct nav_pose guess)
 {
     struct nav_pose mean;
     double mass = nav_particles_near(p, guess, &mean);
@@ -110,9 +110,7 @@ struct nav_summary nav_particles_summary(const struct nav_particles *p, struct n
         nav_particles_near(p, nav_bins_mode(b), &mean);
         mass = nav_particles_near(p, mean, &mean);
     }
-    struct nav_summary out = {.belief = {.mean = mean}, .near = fmin(mass, 1.0)};
-    nav_particles_covariance(p, mean, out.belief.covariance);
-    return out;
+    return (struct nav_mode){mean, fmin(mass, 1.0)};
 }
 
 bool nav_particles_begin(struct nav_particles *p, struct nav_bins *b, const struct nav_likelihood *l,

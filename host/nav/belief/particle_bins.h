@@ -27,9 +27,9 @@ void nav_bins_free(struct nav_bins *);
 /* Sorts a cloud's weights into bins. */
 void nav_bins_fill(struct nav_bins *, const struct nav_particles *);
 
-/* Mean, mass near it and covariance about it: at the mode next to `guess`, or at the heaviest bin when less than half
- * of the mass is near `guess`. Fills the bins if it needs them. */
-struct nav_summary nav_particles_summary(const struct nav_particles *, struct nav_bins *, struct nav_pose guess);
+/* Mean and the mass near it: at the mode next to `guess`, or at the heaviest bin when less than half of the mass is
+ * near `guess`. Fills the bins if it needs them. */
+struct nav_mode nav_particles_summary(const struct nav_particles *, struct nav_bins *, struct nav_pose guess);
 
 /* Draws particles from the prior, as many as its bins ask for; see nav_particles_draw. False when none is free: the
  * particles are then where they were drawn. */

@@ -65,8 +65,9 @@ void nav_particles_resample(struct nav_particles *, long count, double offset);
 /* Mass within NAV_NEAR_M and NAV_NEAR_RAD of a pose, and the mean pose of that part. */
 double nav_particles_near(const struct nav_particles *, struct nav_pose, struct nav_pose *mean);
 
-/* Covariance of all particles about a pose, row-major, m and rad. */
-void nav_particles_covariance(const struct nav_particles *, struct nav_pose about, double covariance[9]);
+/* Covariance of all particles about a pose, once they are moved by what is pending; row-major, m and rad. */
+void nav_particles_covariance(const struct nav_particles *, const struct nav_pending *, struct nav_pose about,
+                              double covariance[9]);
 
 /* Gathers particles into modes: their number, at most NAV_MODES_MOST; what is left then belongs to none. */
 int nav_particles_modes(struct nav_particles *, struct nav_mode mode[NAV_MODES_MOST]);
@@ -81,5 +82,9 @@ void nav_particles_weigh_modes(struct nav_particles *, const double *factor, int
  * which their density gives the width of each. */
 long nav_particles_components(const struct nav_particles *, struct nav_pose about, const struct nav_pending *,
                               double mass, struct nav_component *out, long room);
+
+/* Mass of those components within NAV_NEAR_M and NAV_NEAR_RAD of a pose. */
+double nav_particles_within(const struct nav_particles *, struct nav_pose about, const struct nav_pending *,
+                            struct nav_pose);
 
 #endif

@@ -50,7 +50,7 @@ struct adaptive {
     struct nav_pending pending; /* since the last row that was read ... */
     bool pending_unknown;       /* ... and whether some of it was not reported */
     bool idle;                  /* nothing was read in the row before */
-    struct nav_summary answer;  /* after the last row that was read */
+    struct nav_pose answer;     /* after the last row that was read */
     long evaluations, distinct, touched;
 };
 
@@ -85,19 +85,31 @@ static double adaptive_kidnap_probability(const struct adaptive *a)
 
 static struct nav_pose adaptive_ahead(const struct adaptive *a)
 {
-    return adaptive_log_since(&a->log, a->global.next);
+    return adaptive_log_since(&a->log, a->global.next).step;
+}
+
+/* Whether the histogram holds what the local belief does not. */
+static bool adaptive_two(const struct adaptive *a)
+{
+    return a->awake && !(a->whole && a->local);
+}
+
+static struct adaptive_held adaptive_hold(const struct adaptive *a)
+{
+    double share = adaptive_kidnap_probability(a);
+    bool two = adaptive_two(a);
+    return (struct adaptive_held){.problem = a->problem,
+                                  .gaussian = a->gaussian.carries ? &a->gaussian.kalman.belief : NULL,
+                                  .local = a->local ? &a->cloud.set : NULL,
+                                  .global = two ? &a->global : NULL,
+                                  .log = &a->log,
+                                  .share = two || share > a->problem->settings.adaptive.wake ? share : 0.0};
 }
 
 static void adaptive_sum_up(struct adaptive *a)
 {
-    struct adaptive_held held = {.problem = a->problem,
-                                 .gaussian = a->gaussian.carries ? &a->gaussian.kalman.belief : NULL,
-                                 .local = a->local ? &a->cloud.set : NULL,
-                                 .bins = &a->cloud.bins,
-                                 .global = a->awake && !(a->whole && a->local) ? &a->global : NULL,
-                                 .log = &a->log,
-                                 .share = adaptive_kidnap_probability(a)};
-    a->answer = adaptive_answer(&held, a->answer.belief.mean);
+    struct adaptive_held held = adaptive_hold(a);
+    a->answer = adaptive_answer_pose(&held, &a->cloud.bins, a->answer);
 }
 
 /* Draws the particles from the prior; false when nothing of it is free. */
@@ -117,7 +129,7 @@ static void adaptive_begin_mixture(struct adaptive *a)
         adaptive_global_restart(&a->global, 0);
     a->awake = true;
     a->odds = log(NAV_ANYWHERE / (1.0 - NAV_ANYWHERE));
-    a->answer.belief = nav_mixture_prior(a->problem);
+    a->answer = nav_mixture_prior(a->problem).mean;
     adaptive_sum_up(a);
 }
 
@@ -130,8 +142,9 @@ static void adaptive_begin(struct adaptive *a)
     a->local = !a->problem->prior.uniform && adaptive_begin_cloud(a);
     a->awake = !a->local;
     a->kidnap.proven = a->local ? (double)INFINITY : 0.0; /* a start that is given */
-    a->answer.belief = nav_mixture_prior(a->problem);
-    a->gaussian.compared = a->local && nav_gaussian_mass(&a->answer.belief, NAV_NEAR_M, NAV_NEAR_RAD) >=
+    struct nav_gaussian prior = nav_mixture_prior(a->problem);
+    a->answer = prior.mean;
+    a->gaussian.compared = a->local && nav_gaussian_mass(&prior, NAV_NEAR_M, NAV_NEAR_RAD) >=
                                            1.0 - a->problem->settings.adaptive.scattered;
     adaptive_sum_up(a);
 }
@@ -381,9 +394,12 @@ static void adaptive_compare(struct adaptive *a, double cloud, double gaussian)
         g->compared++;
     if (a->awake || g->compared != 0)
         return;
-    struct nav_summary now = nav_particles_summary(&a->cloud.set, &a->cloud.bins, a->answer.belief.mean);
-    adaptive_gaussian_begin(g, &now.belief);
-    g->compared = now.near >= 1.0 - a->problem->settings.adaptive.scattered;
+    static const struct nav_pending none = {.noise = {0.0, 0.0}};
+    struct nav_mode now = nav_particles_summary(&a->cloud.set, &a->cloud.bins, a->answer);
+    struct nav_gaussian belief = {.mean = now.mean};
+    nav_particles_covariance(&a->cloud.set, &none, now.mean, belief.covariance);
+    adaptive_gaussian_begin(g, &belief);
+    g->compared = now.mass >= 1.0 - a->problem->settings.adaptive.scattered;
 }
 
 /* Returns the row's log-likelihood. */
@@ -450,7 +466,7 @@ static void adaptive_update(void *self, const struct nav_evidence *evidence)
     adaptive_hand_over(a);
     nav_likelihood_read(a->likelihood, evidence);
     adaptive_log_write(&a->log, a->pending.step, a->pending.noise, evidence);
-    a->answer.belief.mean = nav_compose(a->answer.belief.mean, a->pending.step);
+    a->answer = nav_compose(a->answer, a->pending.step);
     if (a->local)
         adaptive_update_local(a, evidence);
     adaptive_search(a);
@@ -463,8 +479,8 @@ static void adaptive_update(void *self, const struct nav_evidence *evidence)
 static void adaptive_estimate(const void *self, struct nav_estimate *out)
 {
     const struct adaptive *a = self;
-    nav_gaussian_ahead(&a->answer.belief, &a->pending, out);
-    out->confidence = a->answer.near;
+    struct adaptive_held held = adaptive_hold(a);
+    adaptive_answer_estimate(&held, a->answer, &a->pending, out);
     out->evaluations = a->evaluations;
     out->distinct = a->distinct;
     out->touched = a->touched;
@@ -477,20 +493,8 @@ static void adaptive_estimate(const void *self, struct nav_estimate *out)
 static long adaptive_components(const void *self, struct nav_component *out, long room)
 {
     const struct adaptive *a = self;
-    bool other = a->awake && !(a->whole && a->local);
-    double share = other ? adaptive_kidnap_probability(a) : 0.0;
-    long count = 0;
-    if (a->gaussian.carries) {
-        struct nav_gaussian now = a->gaussian.kalman.belief;
-        nav_gaussian_move(&now, a->pending.step, &a->pending.noise);
-        return nav_gaussian_components(&now, out, room);
-    }
-    if (a->local)
-        count = nav_particles_components(&a->cloud.set, a->answer.belief.mean, &a->pending, 1.0 - share, out, room);
-    if (!other)
-        return count;
-    long left = room > count ? room - count : 0;
-    return count + adaptive_global_list(&a->global, &a->log, a->pending.step, share, left ? out + count : NULL, left);
+    struct adaptive_held held = adaptive_hold(a);
+    return adaptive_answer_list(&held, a->answer, &a->pending, out, room);
 }
 
 static struct nav_resolution adaptive_resolution(const void *self)

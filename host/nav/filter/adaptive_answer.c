@@ -1,59 +1,110 @@
 #include "adaptive_answer.h"
+
+#include <math.h>
+
 #include "mixture.h"
 
-static double answer_mix(double share, double a, double b)
+/* What one of the two beliefs says about a pose. */
+struct said {
+    double covariance[9], within;
+};
+
+/* Anywhere, as one component. */
+static struct nav_component answer_anywhere(const struct adaptive_held *h)
 {
-    return (1.0 - share) * a + share * b;
+    const struct nav_arena *arena = &h->problem->arena;
+    return (struct nav_component){.pose = {arena->size_x / 2.0, arena->size_y / 2.0, 0.0},
+                                  .sigma_m = hypot(arena->size_x, arena->size_y) / sqrt(24.0),
+                                  .sigma_rad = NAV_PI / sqrt(3.0),
+                                  .mass = h->share};
 }
 
-/* Covariance of a mixture about the first belief's mean. */
-static void answer_mix_covariance(struct nav_gaussian *g, const struct nav_gaussian *other, double share)
+static struct said answer_other(const struct adaptive_held *h, const struct nav_pending *pending, struct nav_pose pose)
 {
-    double d[3] = {other->mean.x - g->mean.x, other->mean.y - g->mean.y, nav_wrap(other->mean.theta - g->mean.theta)};
+    struct said said;
+    if (h->global) {
+        const struct nav_histogram *cells = &h->global->histogram;
+        struct nav_pending since = adaptive_global_since(h->global, h->log, pending);
+        nav_histogram_covariance(cells, &since, pose, said.covariance);
+        said.within = nav_histogram_within(cells, &since, pose);
+        return said;
+    }
+    struct nav_component all = answer_anywhere(h);
+    struct nav_gaussian g = nav_gaussian_uniform(&h->problem->arena);
+    double x = pose.x - g.mean.x, y = pose.y - g.mean.y;
+    nav_gaussian_covariance(&g, pose, said.covariance);
+    said.within = nav_component_near(x * x + y * y, nav_wrap(pose.theta), all.sigma_m, all.sigma_rad);
+    return said;
+}
+
+static struct said answer_local(const struct adaptive_held *h, struct nav_pose answer,
+                                const struct nav_pending *pending, struct nav_pose pose)
+{
+    struct said said;
+    if (h->gaussian) {
+        struct nav_gaussian now = *h->gaussian;
+        nav_gaussian_move(&now, pending->step, &pending->noise);
+        nav_gaussian_covariance(&now, pose, said.covariance);
+        said.within = nav_gaussian_mass(&now, NAV_NEAR_M, NAV_NEAR_RAD);
+        return said;
+    }
+    nav_particles_covariance(h->local, pending, pose, said.covariance);
+    said.within = nav_particles_within(h->local, answer, pending, pose);
+    return said;
+}
+
+void adaptive_answer_estimate(const struct adaptive_held *h, struct nav_pose answer, const struct nav_pending *pending,
+                              struct nav_estimate *out)
+{
+    struct said local = {.within = 0.0}, other = {.within = 0.0};
+    out->pose = nav_compose(answer, pending->step);
+    out->pose.theta = nav_wrap(out->pose.theta);
+    if (h->share < 1.0)
+        local = answer_local(h, answer, pending, out->pose);
+    if (h->share > 0.0)
+        other = answer_other(h, pending, out->pose);
     for (int k = 0; k < 9; k++)
-        g->covariance[k] = answer_mix(share, g->covariance[k], other->covariance[k] + d[k / 3] * d[k % 3]);
+        out->covariance[k] = (1.0 - h->share) * local.covariance[k] + h->share * other.covariance[k];
+    out->confidence = (1.0 - h->share) * local.within + h->share * other.within;
 }
 
-/* Belief of the arena as a whole, for what sleeps. */
-static struct nav_gaussian answer_anywhere(const struct adaptive_held *h)
+long adaptive_answer_list(const struct adaptive_held *h, struct nav_pose answer, const struct nav_pending *pending,
+                          struct nav_component *out, long room)
 {
-    struct nav_problem lost = *h->problem;
-    lost.prior.uniform = true;
-    return nav_mixture_prior(&lost);
-}
-
-static struct nav_summary answer_from_local(const struct adaptive_held *h, struct nav_summary local)
-{
-    struct nav_gaussian other = h->global ? h->global->summary.belief : answer_anywhere(h);
-    answer_mix_covariance(&local.belief, &other, h->share);
-    local.near *= 1.0 - h->share;
-    return local;
-}
-
-static struct nav_summary answer_from_global(const struct adaptive_held *h)
-{
-    struct nav_summary global = h->global->summary;
-    nav_gaussian_move(&global.belief, adaptive_log_since(h->log, h->global->next), &(struct nav_noise){0.0, 0.0});
-    struct nav_summary other = global;
+    long count = 0;
+    if (h->gaussian) {
+        struct nav_gaussian now = *h->gaussian;
+        nav_gaussian_move(&now, pending->step, &pending->noise);
+        return nav_gaussian_components(&now, out, room);
+    }
     if (h->local)
-        other = nav_particles_summary(h->local, h->bins, global.belief.mean);
-    answer_mix_covariance(&global.belief, &other.belief, 1.0 - h->share);
-    global.near *= h->share;
-    return global;
+        count = nav_particles_components(h->local, answer, pending, 1.0 - h->share, out, room);
+    if (!(h->share > 0.0))
+        return count;
+    long left = room > count ? room - count : 0;
+    if (h->global) {
+        struct nav_pending since = adaptive_global_since(h->global, h->log, pending);
+        return count +
+               nav_histogram_components(&h->global->histogram, &since, h->share, left ? out + count : NULL, left);
+    }
+    if (left)
+        out[count] = answer_anywhere(h);
+    return count + 1;
 }
 
 /* A belief that is likelier as a whole may hold less near any one pose: while it is spread, its heaviest place is a
  * guess. */
-struct nav_summary adaptive_answer(const struct adaptive_held *h, struct nav_pose guess)
+struct nav_pose adaptive_answer_pose(const struct adaptive_held *h, struct nav_bins *bins, struct nav_pose guess)
 {
-    if (h->gaussian) {
-        double near = nav_gaussian_mass(h->gaussian, NAV_NEAR_M, NAV_NEAR_RAD);
-        return answer_from_local(h, (struct nav_summary){.belief = *h->gaussian, .near = near});
-    }
-    if (!h->local)
-        return answer_from_global(h);
-    struct nav_summary local = nav_particles_summary(h->local, h->bins, guess);
-    if (h->global && h->share > 0.5 && h->share * h->global->summary.near > (1.0 - h->share) * local.near)
-        return answer_from_global(h);
-    return answer_from_local(h, local);
+    if (h->gaussian)
+        return h->gaussian->mean;
+    struct nav_mode local = {.mass = 0.0};
+    if (h->local)
+        local = nav_particles_summary(h->local, bins, guess);
+    if (!h->global ||
+        (h->local && !(h->share > 0.5 && h->share * h->global->summary.mass > (1.0 - h->share) * local.mass)))
+        return local.mean;
+    struct nav_pose mean = nav_compose(h->global->summary.mean, adaptive_log_since(h->log, h->global->next).step);
+    mean.theta = nav_wrap(mean.theta);
+    return mean;
 }

@@ -116,7 +116,8 @@ static void global_read_job(struct adaptive_global *g, struct adaptive_log *log)
 {
     for (int w = 0; w < g->likelihood->whiskers; w++)
         memset(g->factor[w], 0, (size_t)g->likelihood->model[w].codes * sizeof **g->factor);
-    g->job = (struct adaptive_job){.phase = ADAPTIVE_PASS};
+    g->job = (struct adaptive_job){.phase = ADAPTIVE_PASS,
+                                   .pending = {g->histogram.pending_position, g->histogram.pending_heading}};
     global_gather(g, log);
 }
 
@@ -191,10 +192,11 @@ static void global_begin(struct adaptive_global *g, struct adaptive_log *log)
                                   .self = g,
                                   .most = NAV_LANES * (first ? 1 : EXPECT_CELLS * SUB * SUB * TURNS),
                                   .least = SHARE_LEAST / g->first.cells};
-    nav_histogram_begin(h, g->job.step, &g->weigh, nav_compose(g->summary.belief.mean, g->job.step));
+    nav_histogram_begin(h, g->job.step, &g->weigh, nav_compose(g->summary.mean, g->job.step));
 }
 
-/* Ends a job; a row that fits nowhere, or that lost all mass beyond the walls, leaves nothing to believe. */
+/* The belief is that after the job's rows; a row that fits nowhere, or that lost all mass beyond the walls, leaves
+ * nothing to believe. */
 static void global_end(struct adaptive_global *g)
 {
     uint64_t next = g->job.end;
@@ -208,9 +210,7 @@ static void global_end(struct adaptive_global *g)
     g->job.phase = ADAPTIVE_IDLE;
     g->gained += gain;
     g->next = next;
-    g->summary = (struct nav_summary){.near = 0.0};
-    double near = nav_histogram_summarise(&g->histogram, &g->summary.belief);
-    g->summary.near = fmin(near / g->histogram.total, 1.0);
+    g->summary.mass = nav_histogram_mode(&g->histogram, &g->summary.mean);
 }
 
 /* Counts cells worth a hypothesis, for at most `most` cells passed over. */
@@ -238,14 +238,13 @@ static void global_passed(struct adaptive_global *g)
 {
     struct nav_histogram *h = &g->histogram;
     double worth = h->total / g->room;
+    bool refined = h->level > 0 && h->total > 0.0 && 8 * h->cells <= REFINED_MOST && nav_histogram_refine(h);
     g->scattered = 1.0;
-    g->job.phase = ADAPTIVE_COUNT;
-    if (h->level > 0 && h->total > 0.0 && 8 * h->cells <= REFINED_MOST && nav_histogram_refine(h)) {
-        g->touched += h->cells;
-    } else if (h->level == 0 && (double)h->heaviest >= g->problem->settings.adaptive.per_bin * worth) {
-        return;
-    }
+    g->touched += refined ? h->cells : 0;
     global_end(g);
+    if (!refined && !h->uniform && h->level == 0 &&
+        (double)h->heaviest >= g->problem->settings.adaptive.per_bin * worth)
+        g->job.phase = ADAPTIVE_COUNT;
 }
 
 /* Goes on with a job; false: not within `most` cells. */
@@ -259,7 +258,7 @@ static bool global_go_on(struct adaptive_global *g, long most)
             return false;
         global_passed(g);
     } else if (global_count(g, most)) {
-        global_end(g);
+        g->job.phase = ADAPTIVE_IDLE;
     } else {
         return false;
     }
@@ -289,8 +288,8 @@ void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
     g->job.phase = ADAPTIVE_IDLE;
     g->gained = 0.0;
     g->scattered = 1.0;
-    g->summary = (struct nav_summary){.belief = nav_gaussian_uniform(arena)};
-    g->summary.near = NAV_PI * NAV_NEAR_M * NAV_NEAR_M / (arena->size_x * arena->size_y) * NAV_NEAR_RAD / NAV_PI;
+    g->summary.mean = nav_gaussian_uniform(arena).mean;
+    g->summary.mass = NAV_PI * NAV_NEAR_M * NAV_NEAR_M / (arena->size_x * arena->size_y) * NAV_NEAR_RAD / NAV_PI;
 }
 
 void adaptive_global_clear(struct adaptive_global *g, uint64_t row)
@@ -320,8 +319,7 @@ double adaptive_global_fill(struct adaptive_global *g)
     nav_histogram_begin(h, still, &all, still);
     nav_histogram_run(h, LONG_MAX);
     nav_histogram_each(h, global_square, &squares);
-    double near = nav_histogram_summarise(h, &g->summary.belief);
-    g->summary.near = fmin(near / h->total, 1.0);
+    g->summary.mass = nav_histogram_mode(h, &g->summary.mean);
     double finer = (double)nav_shape_cells(&finest) / (double)nav_shape_cells(&h->shape);
     return finer * h->total * h->total / squares.sum;
 }
@@ -377,11 +375,16 @@ void adaptive_global_added(struct adaptive_global *g)
     g->poses.grains = 0;
 }
 
-long adaptive_global_list(const struct adaptive_global *g, const struct adaptive_log *log, struct nav_pose moved,
-                          double mass, struct nav_component *out, long room)
+struct nav_pending adaptive_global_since(const struct adaptive_global *g, const struct adaptive_log *log,
+                                         const struct nav_pending *pending)
 {
-    const struct nav_pending since = {.step = nav_compose(adaptive_log_since(log, g->next), moved)};
-    return nav_histogram_components(&g->histogram, &since, mass, out, room);
+    struct nav_pending since = adaptive_log_since(log, g->next);
+    nav_pending_add(&since, pending->step, pending->noise);
+    if (g->job.phase == ADAPTIVE_PASS) { /* its rows' noise is among the histogram's */
+        since.noise.position += g->job.pending.position - g->histogram.pending_position;
+        since.noise.heading += g->job.pending.heading - g->histogram.pending_heading;
+    }
+    return since;
 }
 
 /* Cells half as wide as the finest detail that a sensor resolves, where that is less than the setting's. */

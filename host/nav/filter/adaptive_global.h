@@ -19,12 +19,13 @@ enum adaptive_phase { ADAPTIVE_IDLE, ADAPTIVE_PASS, ADAPTIVE_COUNT };
 struct adaptive_job {
     enum adaptive_phase phase;
     struct nav_pose step;
-    double reference;    /* log-likelihood of the best codes: factors are relative to it */
-    double local;        /* log-likelihood of its rows by the local belief */
-    uint64_t end;        /* first row after it */
-    bool uniform;        /* what it began from */
-    uint32_t counted;    /* groups of cells */
-    double light, crowd; /* mass of cells worth less than a hypothesis, and how many are worth more */
+    double reference;         /* log-likelihood of the best codes: factors are relative to it */
+    double local;             /* log-likelihood of its rows by the local belief */
+    uint64_t end;             /* first row after it */
+    struct nav_noise pending; /* of the histogram before it */
+    bool uniform;             /* what it began from */
+    uint32_t counted;         /* groups of cells */
+    double light, crowd;      /* mass of cells worth less than a hypothesis, and how many are worth more */
 };
 
 /* The level that it begins with. */
@@ -54,10 +55,10 @@ struct adaptive_global {
     double budget;  /* cells and hypotheses touched per row, at most */
     float **factor; /* [whiskers][codes] log-likelihood of the present job */
     struct adaptive_job job;
-    uint64_t next;              /* first row of the log that it has not seen */
-    double gained;              /* log-likelihood of the rows seen, less the local belief's, since the restart */
-    struct nav_summary summary; /* at row `next` - 1 */
-    double room;                /* hypotheses that a cloud could hold */
+    uint64_t next;           /* first row of the log that it has not seen */
+    double gained;           /* log-likelihood of the rows seen, less the local belief's, since the restart */
+    struct nav_mode summary; /* where it holds most, at row `next` - 1 */
+    double room;             /* hypotheses that a cloud could hold */
     struct adaptive_poses poses;
     double scattered, crowd; /* share of mass in cells worth less than a hypothesis; cells that are worth more */
     long touched, distinct;  /* since they were last cleared */
@@ -94,9 +95,9 @@ void adaptive_global_share(const struct adaptive_global *, const struct nav_mode
 void adaptive_global_add(struct adaptive_global *, struct nav_pose, double share);
 void adaptive_global_added(struct adaptive_global *);
 
-/* Lists cells as nav_filter_components does, at the end of the log and then moved by `moved`, masses times `mass`. */
-long adaptive_global_list(const struct adaptive_global *, const struct adaptive_log *, struct nav_pose moved,
-                          double mass, struct nav_component *out, long room);
+/* Motion from the belief's row to the end of the log, and then what is pending, with the noise of all. */
+struct nav_pending adaptive_global_since(const struct adaptive_global *, const struct adaptive_log *,
+                                         const struct nav_pending *);
 
 /* Cells of the level that it is at; bytes of all. */
 size_t adaptive_global_cells(const struct adaptive_global *);

@@ -64,11 +64,11 @@ struct nav_evidence adaptive_log_replay(struct adaptive_log *log, uint64_t row)
     return (struct nav_evidence){.reading = log->reading, .weight = log->weight + log_place(row) * log->whiskers};
 }
 
-struct nav_pose adaptive_log_since(const struct adaptive_log *log, uint64_t from)
+struct nav_pending adaptive_log_since(const struct adaptive_log *log, uint64_t from)
 {
-    struct nav_pose moved = {0.0, 0.0, 0.0};
+    struct nav_pending moved = {.step = {0.0, 0.0, 0.0}};
     for (uint64_t row = from; row < log->head; row++)
-        moved = nav_compose(moved, log->entry[log_place(row)].step);
+        nav_pending_add(&moved, log->entry[log_place(row)].step, log->entry[log_place(row)].noise);
     return moved;
 }
 

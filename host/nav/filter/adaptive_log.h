@@ -50,7 +50,7 @@ struct adaptive_entry *adaptive_log_entry(struct adaptive_log *, uint64_t row);
 struct nav_evidence adaptive_log_replay(struct adaptive_log *, uint64_t row);
 
 /* Motion from the end of row `from` - 1 to the end of the last. */
-struct nav_pose adaptive_log_since(const struct adaptive_log *, uint64_t from);
+struct nav_pending adaptive_log_since(const struct adaptive_log *, uint64_t from);
 
 size_t adaptive_log_bytes(const struct adaptive_log *);
 

@@ -6,6 +6,7 @@
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "calibration.h"
 #include "expected.h"
@@ -24,10 +25,11 @@ struct grid {
     struct nav_expected *expected;
     struct nav_histogram histogram;
     struct nav_weigh weigh;
-    struct nav_layer *layer;     /* [slices] where each lies in the tables */
-    struct nav_pending pending;  /* since the last update */
-    struct nav_gaussian summary; /* of the belief at the last update: mean near the mode, covariance about it */
-    double confidence;
+    struct nav_layer *layer;    /* [slices] where each lies in the tables */
+    struct nav_pending pending; /* since the last update */
+    struct nav_pose mean;       /* near the mode, at the last update */
+    double near;                /* before the present row: from SURE on it judges its readings, and the odometry */
+    bool sure;
     struct nav_calibration calibration;
     struct nav_motion last; /* motion of the row before, as applied */
 };
@@ -56,10 +58,10 @@ static void grid_expect_cell(struct grid *g, int p, int line, int column, double
     const struct nav_shape *s = &g->histogram.shape;
     if (mass <= LIGHT)
         return;
-    double x = (column + 0.5) * s->cell + nav_histogram_shift_x(&g->histogram, p) - g->summary.mean.x;
-    double y = (line + 0.5) * s->cell + nav_histogram_shift_y(&g->histogram, p) - g->summary.mean.y;
+    double x = (column + 0.5) * s->cell + nav_histogram_shift_x(&g->histogram, p) - g->mean.x;
+    double y = (line + 0.5) * s->cell + nav_histogram_shift_y(&g->histogram, p) - g->mean.y;
     int poses = g->expected->sub * g->expected->sub * g->expected->turns;
-    double turn = nav_histogram_heading(&g->histogram, p) - g->summary.mean.theta;
+    double turn = nav_histogram_heading(&g->histogram, p) - g->mean.theta;
     if (hypot(x, y) > NAV_NEAR_M || fabs(nav_wrap(turn)) > NAV_NEAR_RAD)
         return;
     for (int n = 0; n < poses; n++) {
@@ -73,7 +75,7 @@ static long grid_weigh_group(void *self, int p, int line, int group, const float
 {
     struct grid *g = self;
     nav_expected_mean(g->expected, &g->layer[p], line, group * NAV_LANES, mass, like);
-    for (int k = 0; k < NAV_LANES && g->confidence >= SURE; k++)
+    for (int k = 0; k < NAV_LANES && g->sure; k++)
         grid_expect_cell(g, p, line, group * NAV_LANES + k, (double)mass[k]);
     return 0;
 }
@@ -86,14 +88,14 @@ static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
     enum { PASSES_MOST = 25 };
     struct nav_histogram *h = &g->histogram;
     for (int n = 0; n < PASSES_MOST && nav_histogram_debt(h) > 1.0 && h->total > 0.0; n++) {
-        nav_histogram_begin(h, step, &noise, g->summary.mean);
+        nav_histogram_begin(h, step, &noise, g->mean);
         nav_histogram_run(h, LONG_MAX);
         step = (struct nav_pose){0.0, 0.0, 0.0};
     }
     if (!(h->total > 0.0))
         return false;
     g->weigh = (struct nav_weigh){.group = grid_weigh_group, .self = g, .extra = extra};
-    nav_histogram_begin(h, step, &g->weigh, g->summary.mean);
+    nav_histogram_begin(h, step, &g->weigh, g->mean);
     grid_find_layers(g);
     nav_histogram_run(h, LONG_MAX);
     return h->total > 0.0 && isfinite(h->total);
@@ -102,18 +104,17 @@ static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
 static void grid_summarise(struct grid *g)
 {
     if (!(g->histogram.total > 0.0)) { /* no place in the arena is free: nothing can be known */
-        g->summary = nav_gaussian_uniform(&g->problem->arena);
-        g->confidence = 0.0;
+        g->mean = nav_gaussian_uniform(&g->problem->arena).mean;
+        g->near = 0.0;
         return;
     }
-    double near = nav_histogram_summarise(&g->histogram, &g->summary);
-    g->confidence = fmin(near / g->histogram.total, 1.0);
+    g->near = nav_histogram_mode(&g->histogram, &g->mean);
 }
 
 /* Spreads the belief over free space, by what the present row says. */
 static void grid_forget(struct grid *g)
 {
-    g->confidence = 0.0;
+    g->sure = false;
     nav_histogram_restart(&g->histogram, 0);
     grid_reweigh(g, (struct nav_pose){0.0, 0.0, 0.0}, 0.0);
 }
@@ -122,7 +123,7 @@ static void grid_forget(struct grid *g)
 static void grid_begin(struct grid *g)
 {
     const struct nav_prior *prior = &g->problem->prior;
-    g->summary.mean = prior->mean;
+    g->mean = prior->mean;
     nav_expected_begin(g->expected, (const float *const *)g->likelihood->table, 0.0f);
     nav_expected_scale(g->expected);
     if (!prior->uniform)
@@ -176,6 +177,7 @@ static struct nav_motion grid_calibrated(struct grid *g, const struct nav_motion
         return *motion;
     struct nav_estimate now;
     grid_estimate(g, &now);
+    now.confidence = g->near;
     nav_calibration_learn(&g->calibration, &g->last, &now);
     g->last = nav_calibration_apply(&g->calibration, motion);
     return g->last;
@@ -184,6 +186,8 @@ static struct nav_motion grid_calibrated(struct grid *g, const struct nav_motion
 static void grid_predict(void *self, const struct nav_motion *reported)
 {
     struct grid *g = self;
+    if (g->pending.noise.position > 0.0) /* nothing was read in the row before */
+        g->near = nav_histogram_within(&g->histogram, &g->pending, nav_compose(g->mean, g->pending.step));
     struct nav_motion motion = grid_calibrated(g, reported);
     struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, &motion);
     noise.position += nav_histogram_fan(&g->histogram, motion.step, g->problem->settings.motion.along_m);
@@ -194,15 +198,15 @@ static void grid_update(void *self, const struct nav_evidence *evidence)
 {
     struct grid *g = self;
     struct nav_pose step = g->pending.step;
+    bool sure = g->sure = g->near >= SURE; /* fairly */
     g->histogram.pending_position += g->pending.noise.position;
     g->histogram.pending_heading += g->pending.noise.heading;
-    g->summary.mean = nav_compose(g->summary.mean, step);
+    g->mean = nav_compose(g->mean, step);
     g->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
     nav_likelihood_read(g->likelihood, evidence);
     nav_expected_begin(g->expected, (const float *const *)g->likelihood->table, 0.0f);
     nav_expected_scale(g->expected);
     nav_trust_begin(g->likelihood);
-    bool sure = g->confidence >= SURE; /* fairly: it judges the row's readings */
     if (!grid_reweigh(g, step, g->problem->settings.grid.teleport / nav_shape_inside(&g->histogram.shape)))
         grid_forget(g);
     if (sure)
@@ -213,8 +217,13 @@ static void grid_update(void *self, const struct nav_evidence *evidence)
 static void grid_estimate(const void *self, struct nav_estimate *out)
 {
     const struct grid *g = self;
-    nav_gaussian_ahead(&g->summary, &g->pending, out);
-    out->confidence = g->confidence;
+    out->pose = nav_compose(g->mean, g->pending.step);
+    out->pose.theta = nav_wrap(out->pose.theta);
+    if (g->histogram.total > 0.0)
+        nav_histogram_covariance(&g->histogram, &g->pending, out->pose, out->covariance);
+    else
+        memcpy(out->covariance, nav_gaussian_uniform(&g->problem->arena).covariance, sizeof out->covariance);
+    out->confidence = nav_histogram_within(&g->histogram, &g->pending, out->pose);
     out->states = out->touched = out->evaluations = (long)nav_shape_inside(&g->histogram.shape);
     out->distinct = (long)g->expected->knowns;
     out->bytes = sizeof *g + nav_histogram_bytes(&g->histogram) + nav_expected_bytes(g->expected);

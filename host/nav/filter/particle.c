@@ -30,8 +30,8 @@ struct particle {
     struct nav_sample sample;
     double slow, fast; /* averages of the mean weight; negative before the first row */
     struct nav_pending pending;
-    struct nav_summary summary;
-    long weighed, moved; /* for the last row */
+    struct nav_pose mean; /* near the last one or near the heaviest part, without what is pending */
+    long weighed, moved;  /* for the last row */
 };
 
 static void particle_destroy(void *self)
@@ -43,10 +43,9 @@ static void particle_destroy(void *self)
     free(f);
 }
 
-/* Mean near the last one or near the heaviest part; covariance of the whole about it. */
 static void particle_summarise(struct particle *f)
 {
-    f->summary = nav_particles_summary(&f->cloud, &f->bins, f->summary.belief.mean);
+    f->mean = nav_particles_summary(&f->cloud, &f->bins, f->mean).mean;
 }
 
 static void *particle_create(const struct nav_problem *problem)
@@ -68,7 +67,7 @@ static void *particle_create(const struct nav_problem *problem)
         return NULL;
     }
     nav_particles_begin(&f->cloud, &f->bins, f->likelihood, &problem->prior, NAV_ANYWHERE, &f->rng, &f->sample);
-    f->summary.belief.mean = nav_particles_pose(&f->cloud, 0);
+    f->mean = nav_particles_pose(&f->cloud, 0);
     particle_summarise(f);
     return f;
 }
@@ -76,7 +75,7 @@ static void *particle_create(const struct nav_problem *problem)
 static void particle_catch_up(struct particle *f)
 {
     nav_particles_move(&f->cloud, f->pending.step, &f->pending.noise, true, &f->rng);
-    f->summary.belief.mean = nav_compose(f->summary.belief.mean, f->pending.step);
+    f->mean = nav_compose(f->mean, f->pending.step);
     f->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
     f->moved += f->cloud.count;
 }
@@ -149,18 +148,17 @@ static void particle_update(void *self, const struct nav_evidence *evidence)
     particle_summarise(f);
     if (uneven || fresh > 0.0)
         particle_resample(f, fresh);
+    if (fresh > 0.0) /* another belief than was summarised */
+        particle_summarise(f);
 }
 
 static void particle_estimate(const void *self, struct nav_estimate *out)
 {
     const struct particle *f = self;
-    struct nav_gaussian now = f->summary.belief;
-    /* Fewer particles than dimensions have a flat covariance; nobody knows the pose better than a millimetre. */
-    now.covariance[0] += 1e-6;
-    now.covariance[4] += 1e-6;
-    now.covariance[8] += 1e-6;
-    nav_gaussian_ahead(&now, &f->pending, out);
-    out->confidence = f->summary.near;
+    out->pose = nav_compose(f->mean, f->pending.step);
+    out->pose.theta = nav_wrap(out->pose.theta);
+    nav_particles_covariance(&f->cloud, &f->pending, out->pose, out->covariance);
+    out->confidence = nav_particles_within(&f->cloud, f->mean, &f->pending, out->pose);
     out->evaluations = out->distinct = f->weighed;
     out->touched = f->weighed + f->moved;
     out->states = f->cloud.count;
@@ -171,7 +169,7 @@ static void particle_estimate(const void *self, struct nav_estimate *out)
 static long particle_components(const void *self, struct nav_component *out, long room)
 {
     const struct particle *f = self;
-    return nav_particles_components(&f->cloud, f->summary.belief.mean, &f->pending, 1.0, out, room);
+    return nav_particles_components(&f->cloud, f->mean, &f->pending, 1.0, out, room);
 }
 
 const struct nav_filter_ops nav_particle_filter = {.name = "particle",

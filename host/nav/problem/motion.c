@@ -21,7 +21,12 @@ struct nav_noise nav_motion_noise(const struct nav_robot *robot, const struct na
 
 void nav_pending_add(struct nav_pending *pending, struct nav_pose step, struct nav_noise noise)
 {
-    pending->step = nav_compose(pending->step, step);
-    pending->noise.position += noise.position;
+    struct nav_pose to = nav_compose(pending->step, step);
+    double x = to.x - pending->step.x, y = to.y - pending->step.y, turned = pending->noise.heading;
+    pending->step = to;
+    pending->noise.position +=
+        noise.position + 0.5 * turned * (x * x + y * y) + y * pending->swing_y + x * pending->swing_x;
+    pending->swing_x += turned * x;
+    pending->swing_y += turned * y;
     pending->noise.heading += noise.heading;
 }

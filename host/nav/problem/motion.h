@@ -19,10 +19,12 @@ struct nav_noise {
     double heading;  /* rad^2 */
 };
 
-/* Motion put off: motions compose exactly, so nothing is lost. */
+/* Motion put off: motions compose exactly, and an early error in heading leads the later ones astray. */
 struct nav_pending {
     struct nav_pose step;
     struct nav_noise noise;
+    double swing_x,
+        swing_y; /* covariance of heading and end point, m rad, in the frame of the start, a quarter turn back */
 };
 
 void nav_pending_add(struct nav_pending *, struct nav_pose step, struct nav_noise);

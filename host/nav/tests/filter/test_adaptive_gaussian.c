@@ -121,7 +121,7 @@ static void draws_have_its_moments_and_more_of_them_are_wider(void **state)
         c.g.wider = wide ? 100.0 : 0.0;
         adaptive_gaussian_draw(&c.g, &set, &rng, DRAWS);
         assert_int_equal(set.count, wide ? 4 * DRAWS : DRAWS);
-        nav_particles_covariance(&set, c.g.kalman.belief.mean, covariance);
+        nav_particles_covariance(&set, &(struct nav_pending){.noise = {0.0, 0.0}}, c.g.kalman.belief.mean, covariance);
         for (int k = 0; k < 9; k++)
             assert_near(covariance[k], scale * c.g.kalman.belief.covariance[k], scale * 6e-5);
     }

@@ -146,7 +146,7 @@ static void coarse_cells_are_refined_where_mass_is(void **state)
     write(&b, NO_NOISE, NULL);
     work(&b, PLENTY);
     assert_near(b.g.histogram.shape.cell, b.g.wanted, 1e-12);
-    assert_true(b.g.scattered < 0.5 && b.g.summary.near > 0.5);
+    assert_true(b.g.scattered < 0.5 && b.g.summary.mass > 0.5);
     end(&b);
 }
 

@@ -164,7 +164,7 @@ static void motion_put_off_is_kept_exactly(void **state)
     struct grid *g = grid_create(&p);
     struct nav_estimate before, after;
     const struct nav_motion step = {.step = {0.003, 0.0, 0.01}};
-    struct nav_pose walked = g->summary.mean;
+    struct nav_pose walked = g->mean;
     grid_estimate(g, &before);
     for (int i = 0; i < 30; i++) {
         grid_predict(g, &step);
