@@ -1,6 +1,7 @@
 """The robot's part of whisker-view in headless Chromium: what a person sees is what the messages reported, and no more."""
 
 import asyncio
+from dataclasses import replace
 
 import chromium
 import numpy as np
@@ -10,6 +11,7 @@ from viewkit import made_frames, ring_of
 from viewpage import DRAWN, looking_at
 from viewrobot import ARENA, SCENE, Clock, MadeUpRun, Post, belief_message, estimate, robot_view, route, touch_map
 
+from crunchbot.occupancy import to_map
 from crunchbot.robot.network.messages import (
     Behaviour,
     Header,
@@ -340,5 +342,32 @@ def test_a_map_takes_the_arenas_place_with_what_was_felt():
             assert await b.eval(place(FLOOR_SEEN, 0.25, 0.0, good)) and not await b.eval(
                 place(FLOOR_SEEN, 0.6, 0.0, good)
             )
+
+    asyncio.run(scenario())
+
+
+def test_an_arena_is_drawn_where_it_is_on_the_map():
+    scene = replace(SCENE, origin=(-10.0, -3.0, 1.0))
+    corners = to_map(np.array([(x, y, 0.0) for x in (0.0, 2.5) for y in (0.0, 2.5)]), scene.origin)[:, :2]
+    x0, y0, x1, y1 = ARENA.obstacles[0]
+    middles = np.array([((x0 + x1) / 2, (y0 + y1) / 2, 0.0), (0.25, 0.25, 0.0)])
+    (block, free), reported = to_map(middles, scene.origin)[:, :2].tolist(), to_map(middles[1:], scene.origin)[0]
+
+    async def scenario():
+        post = Post()
+        async with looking_at(post, scene=scene) as (b, _):
+            await b.until("robotPart.scene?.arena && robotPart.plan.scale")
+            bounds = [*corners.min(axis=0), *corners.max(axis=0)]
+            assert await b.eval("robotPart.plan.bounds") == pytest.approx(bounds)
+            fill = await colour(b, "--block")
+            assert await b.eval(place(FLOOR_SEEN, *block, fill)) and not await b.eval(place(FLOOR_SEEN, *free, fill))
+            await b.press("p")
+            values = "[['x', {}], ['y', {}], ['heading', 0]].forEach(([n, v]) => {{ $(`pose-${{n}}`).value = v; }})"
+            await b.eval(values.format(*reported[:2]))
+            await b.click("#pose-send")
+            async with asyncio.timeout(PATIENCE_S):
+                while not post.poses:
+                    await asyncio.sleep(0.01)
+            assert post.poses == [pytest.approx((*reported[:2], 0.0))]
 
     asyncio.run(scenario())
