@@ -31,12 +31,12 @@ def is_bag(path: Path) -> bool:
 
 
 def read_bag(
-    path: Path, warn: Callable[[str], None], given: str | None, table: Path | None
+    path: Path, warn: Callable[[str], None], given: str | None, topics: Path | None
 ) -> tuple[Scene, Observations]:
-    """(scene, rows) of a bag, each damage asked to `warn`; the scene is the folder `given`, or the bag's. `table`: of its
-    topics, if they are ordinary ones. BagError when it holds none."""
+    """(scene, rows) of a bag, each damage asked to `warn`; the scene is the folder `given`, or the bag's. `topics`: a
+    table of them, if they are ordinary ones. BagError when it holds none."""
     scene = load(given) if given else None
-    played = read_by_table(path, table, scene) if table else played_bag(path, ("observation", "truth"))
+    played = read_by_table(path, topics, scene) if topics else played_bag(path, ("observation", "truth"))
     for line in played.damage:
         warn(line)
     rows, truth = ([said.message for said in played.said if said.topic == name] for name in ("observation", "truth"))
@@ -45,7 +45,14 @@ def read_bag(
         what = "observations; give another bag" if scene else f"{ARENA}; give the robot's scene with --scene"
         raise BagError(f"{path}: holds no {what}")
     robot = replace(scene.robot, sensors=tuple(s for s in scene.robot.sensors if s.name in rows[0].names))
-    return _with_rows(replace(scene, robot=robot), _table(scene, rows, truth))
+    scene = replace(scene, robot=robot)
+    needed = [*scene.layout.of(Quantity.TEXTURE), *scene.layout.of(Quantity.DISTANCE)]
+    if lacking := [name for name in needed if name not in rows[0].names]:
+        raise BagError(f"{path}: no column '{lacking[0]}' in its rows; give the scene of this very robot with --scene")
+    table = _table(scene, rows, truth)
+    if missing := len(table) - len(rows):
+        warn(f"{path}: {missing} rows are missing; they are there without readings, their motion spread evenly")
+    return _with_rows(scene, table)
 
 
 def _table(scene: Scene, rows: list[Observation], truth: list[PoseStamped]) -> list[dict[str, str]]:

@@ -18,7 +18,7 @@ from ..recording.rosbag import RosBag
 from ..scene import Scene
 from ..scene_table import Table
 from .network.ros import heading_of
-from .network.rows import ROW_NS, between, to_message
+from .network.rows import LEAP_NS, ROW_NS, between, to_message
 from .played import BagError, Played, Said
 
 MOTION = "motion"  # the column of an odometry
@@ -116,6 +116,10 @@ def _said(bag: RosBag, cells: dict[str, list], scene: Scene) -> list[Said]:
         bag.note(f"{MOTION}: {np.count_nonzero(~known)} poses without a heading are left out")
     start, poses = poses[:1, 0].sum(), poses[known]
     times, poses[:, 3] = poses[:, 0] - start, np.unwrap(poses[:, 3])
+    if np.diff(times).max(initial=0.0) > LEAP_NS:
+        raise BagError(
+            f"{bag.path}: its clock leaps by more than a day; give the part of the bag before or behind that"
+        )
     ends = np.arange(0.0, times.max(initial=0.0) + 1.0, ROW_NS)
     if len(ends) < 2:
         raise BagError(f"{bag.path}: less than a row of odometry; give a bag of a longer drive")

@@ -91,6 +91,22 @@ def test_a_robots_rows_are_read_from_any_bag_that_holds_them(scene, tmp_path, ca
         assert Playback(played).length_s == pytest.approx((ROWS - 1) * 0.1 + 1e-6)
 
 
+def test_rows_that_were_lost_on_the_way_are_counted(scene, tmp_path, capsys):
+    kept = [said for said in scene[3] if not 4 * ROW_NS < said[2] - START_NS < 8 * ROW_NS]
+    bag = recorded(tmp_path / "bag", "mcap", kept)
+    code, _, err = run(capsys, "scene", "from", bag, "--scene", scene[0], "--out", tmp_path / "x")
+    assert code == 0 and len(rows_of(tmp_path / "x")) == ROWS
+    assert err.startswith(f"whisker: warning: {bag}: 3 rows are missing; they are there") and err.count("\n") == 1
+
+
+def test_a_scene_of_another_robot_is_refused(scene, tmp_path, table, capsys):
+    bag = recorded(tmp_path / "rows", "sqlite", scene[3])
+    code, _, err = run(capsys, "scene", "from", bag, "--scene", tmp_path / "own", "--out", tmp_path / "x")
+    assert (
+        code == 2 and err.count("\n") == 1 and err.startswith(f"whisker: {bag}: no column 'front_mm' in its rows; give")
+    )
+
+
 def test_a_bag_whose_recorder_was_killed_is_read_without_its_index(scene, tmp_path, capsys):
     bag = recorded(tmp_path / "bag", "mcap", scene[3])
     (bag / "metadata.yaml").unlink()
@@ -165,7 +181,7 @@ def place(t: float) -> tuple[float, float, float]:
     return SPEED / TURN * math.sin(theta), -SPEED / TURN * math.cos(theta), theta
 
 
-def ordinary(folder, storage, seconds=3.0, gap=(9.0, 9.0), headless=(), extra=()):
+def ordinary(folder, storage, seconds=3.0, gap=(9.0, 9.0), headless=(), start_ns=START_NS):
     """20 Hz of odometry, 15 Hz of ranges, 40 Hz of joints, 30 Hz of contacts. Stamps are of another clock: zero."""
     types = get_typestore(Stores.ROS2_JAZZY)
     for name, text in GZ.items():
@@ -210,7 +226,8 @@ def ordinary(folder, storage, seconds=3.0, gap=(9.0, 9.0), headless=(), extra=()
             kind = message.__msgtype__
             if topic not in known:
                 known[topic] = writer.add_connection(topic, kind, typestore=types)
-            writer.write(known[topic], START_NS + round(t * 1e9), types.serialize_cdr(message, kind))
+            at_ns = START_NS if t else start_ns
+            writer.write(known[topic], at_ns + round(t * 1e9), types.serialize_cdr(message, kind))
     return folder
 
 
@@ -321,6 +338,14 @@ def test_a_table_names_the_odometry(tmp_path, table, capsys, text, said):
     options = ("--scene", tmp_path / "own", "--topics", table, "--out", tmp_path / "a")
     code, _, err = run(capsys, "scene", "from", bag, *options)
     assert code == 2 and said in err and err.count("\n") == 1
+
+
+def test_a_clock_that_leaps_is_refused(tmp_path, table, capsys):
+    """As of a simulation whose clock was not there at first: 18 billion rows."""
+    bag = ordinary(tmp_path / "bag", "mcap", start_ns=10**9)
+    options = ("--scene", tmp_path / "own", "--topics", table, "--out", tmp_path / "a")
+    code, _, err = run(capsys, "scene", "from", bag, *options)
+    assert code == 2 and "its clock leaps by more than a day; give the part of the bag before" in err
 
 
 def test_a_drive_shorter_than_a_row_is_refused(tmp_path, table, capsys):
