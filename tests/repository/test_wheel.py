@@ -7,10 +7,12 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import zipfile
 from pathlib import Path
 
 import pytest
 from chainrun import BUILD, ROOT
+from remedies import commands
 
 from crunchbot import __version__
 
@@ -164,7 +166,22 @@ def test_the_laboratory_is_named_where_it_is_missing(venv):
         done = subprocess.run(
             [venv / "bin/python", "-c", block, *words], env=bare_environment(), cwd=venv, capture_output=True, text=True
         )
-        assert done.returncode == 2 and done.stderr.count("\n") == 1 and "pip install crunchbot-lab" in done.stderr
+        assert done.returncode == 2 and done.stderr.count("\n") == 1
+        assert "make wheels, then pip install --find-links dist 'crunchbot[lab]'" in done.stderr
+
+
+def metadata_of(wheel: Path) -> str:
+    with zipfile.ZipFile(wheel) as file:
+        return file.read(next(name for name in file.namelist() if name.endswith(".dist-info/METADATA"))).decode()
+
+
+def test_the_wheels_have_what_remedies_name(wheels, lab):
+    """Extras by their metadata, commands and options by their own `whisker`."""
+    metadata = [metadata_of(path) for path in wheels]
+    assert "Provides-Extra: lab\n" in metadata[0] and "Name: crunchbot-lab\n" in metadata[1]
+    assert re.search(r"Requires-Dist: crunchbot-lab; extra == .lab.", metadata[0])
+    assert re.search(r"Requires-Dist: crunchbot-sim==", metadata[1])
+    assert commands(lab / "bin/python", env=bare_environment(), cwd=lab) == commands(sys.executable)
 
 
 def test_a_simulated_robot_runs_where_the_wheels_are(lab):

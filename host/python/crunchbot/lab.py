@@ -15,6 +15,5 @@ def import_lab(module: str, user: str) -> ModuleType:
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != LAB:
             raise
-        raise UserError(
-            f"{user}: needs the package crunchbot-lab; install it with: pip install crunchbot-lab"
-        ) from None
+        text = "needs the package crunchbot-lab; in the source tree: make wheels, then"
+        raise UserError(f"{user}: {text} pip install --find-links dist 'crunchbot[lab]'") from None

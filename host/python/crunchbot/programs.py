@@ -7,6 +7,7 @@ from pathlib import Path
 
 from .errors import UserError
 
+INSTALLED = ("whiskerd", "whisker-base", "whisker-flash", "whisker-log")  # of the Debian package whiskerd, too
 SOURCE_TREE = Path(__file__).resolve().parents[3]
 
 
@@ -24,12 +25,16 @@ def program(name: str) -> str:
         return found
     if found := _packaged(name):
         return found
-    remedy = (
-        "install umockdev"
-        if name.startswith("umockdev")
-        else "pip install crunchbot-sim, or run 'make build' in a source tree"
-    )
-    raise UserError(f"{name}: not found; {remedy}, or name the folder in $WHISKER_BUILD")
+    raise UserError(f"{name}: not found; {_remedy(name)}, or name the folder in $WHISKER_BUILD")
+
+
+def _remedy(name: str) -> str:
+    """Where a program comes from: no index has the wheels before a release."""
+    if name.startswith("umockdev"):
+        return "install umockdev"
+    if name in INSTALLED:
+        return "in the source tree: make build, then sudo cmake --install build/release"
+    return "in the source tree: make wheels, then pip install --find-links dist crunchbot-sim"
 
 
 def _packaged(name: str) -> str | None:

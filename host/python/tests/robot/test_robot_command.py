@@ -259,7 +259,7 @@ def test_a_simulated_robot_needs_the_laboratory(refused, monkeypatch):
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "crunchbot_lab", None)
     code, line = refused("--simulated")
-    assert code == 2 and "robot: --simulated" in line and "pip install crunchbot-lab" in line
+    assert code == 2 and "robot: --simulated" in line and "pip install --find-links dist 'crunchbot[lab]'" in line
 
 
 WHISKER_COMMANDS = {"pilot", "navigator", "bag", "view"}

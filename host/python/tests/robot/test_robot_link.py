@@ -197,7 +197,7 @@ def test_what_is_no_message_is_counted_and_said_and_the_rest_goes_on():
         forger.put(m.encode(row(2)))
         pair.come(2)
         assert (pair.tally.refused, pair.inbox.refused, pair.tally.missed) == (5, 5, 0)
-        assert re.fullmatch("observation: .*; install one release of whisker on both sides", pair.inbox.last_error)
+        assert re.fullmatch("observation: .*; install one release of crunchbot on both sides", pair.inbox.last_error)
 
 
 def test_a_row_counts_as_its_stream_does():

@@ -199,10 +199,10 @@ def _kind(topic: str, encoding: str) -> type:
     try:
         kind = type_of(topic)
     except KeyError:
-        text = f"{topic}: no topic of this release; install one release of whisker on both sides"
+        text = f"{topic}: no topic of this release; install one release of crunchbot on both sides"
         raise MessageError(text) from None
     if encoding != encoding_of(kind):
-        text = f"{encoding:.80} where {encoding_of(kind)} belongs; install one release of whisker on both sides"
+        text = f"{encoding:.80} where {encoding_of(kind)} belongs; install one release of crunchbot on both sides"
         raise MessageError(f"{topic}: field encoding: {text}")
     return kind
 

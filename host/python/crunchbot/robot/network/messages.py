@@ -178,7 +178,7 @@ PACKAGES = {
 TYPES = {f"{package}/msg/{kind.__name__}": kind for package, kinds in PACKAGES.items() for kind in kinds}
 SCHEMAS = {kind: schema for schema, kind in TYPES.items()}
 ROUNDING = 1e-6  # relative, of sums
-REMEDIES = ("install one release of whisker on both sides", "stop what sends it")  # not readable; not possible
+REMEDIES = ("install one release of crunchbot on both sides", "stop what sends it")  # not readable; not possible
 
 # topic: the class of its messages. Health has a topic for each process, below "health/".
 TOPICS = {
