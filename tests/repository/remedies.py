@@ -19,7 +19,9 @@ MAKE = re.compile(r"(?:[`';:] ?|\brun |\bit: )make ([a-z-]+)(?=[`';,)]| [A-Z_]+=
 PIP = re.compile(r"pip install ((?:--?\S+ \S+ )*)'?([a-z-]+)(?:\[([a-z,{}]+)\])?")
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
 # What these name is theirs; a word alone is no message, but one of a command line.
-FOREIGN = re.compile(r"\b(cmake|udevadm|usbip|pip|systemctl|rosbags-convert)\b[^;,)']*|var\([^)]*\)|^'?--[\w-]+(=\w+)?'?$")
+FOREIGN = re.compile(
+    r"\b(cmake|udevadm|usbip|pip|systemctl|rosbags-convert)\b[^;,)']*|var\([^)]*\)|^'?--[\w-]+(=\w+)?'?$"
+)
 DUMP = """
 import argparse, json, re
 from crunchbot.cli import COMMANDS, parser_of
