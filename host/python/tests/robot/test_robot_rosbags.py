@@ -372,3 +372,12 @@ def test_the_page_plays_bags_of_others(scene, tmp_path, table, capsys, monkeypat
     assert whisker_view([str(other), "--topics", str(table)]) == whisker_view(["--topics", str(table)]) == 2
     err = capsys.readouterr().err.splitlines()
     assert "give the scene with --scene" in err[0] and "--topics: no bag to read by it; name one" in err[1]
+
+
+def test_a_robot_without_object_whiskers_has_rows_too(scene, tmp_path, table, capsys):
+    blind = Scene(ARENA, Robot(0.1, 0.05, 0.01, (Whisker("foot", "texture", tip_m=(0.1, 0.0)),), (LIGHT,)), None)
+    write(tmp_path / "blind", blind)
+    bag, words = ordinary(tmp_path / "bag", "mcap"), ("--topics", minimal(tmp_path, "/slow", "light", "contact = 1"))
+    code, _, _ = run(capsys, "scene", "from", bag, "--scene", tmp_path / "blind", *words, "--out", tmp_path / "a")
+    rows = rows_of(tmp_path / "a")
+    assert code == 0 and np.isnan(rows.texture).all() and rows.radial_m.shape == (30, 0) and rows.normal is None
