@@ -6,7 +6,9 @@ client may command.
 """
 
 import socket
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from ..errors import UserError
 
@@ -93,19 +95,17 @@ class Base:
 
     def odometry(self, after: int | None = None) -> Motion:
         """Motion since this client's last call, or since it connected."""
-        *numbers, bits = self._ask("odometry", "odometry", after)
-        x, y, theta, xx, xy, xt, yy, yt, tt = map(float, numbers)
-        return Motion(x, y, theta, ((xx, xy, xt), (xy, yy, yt), (xt, yt, tt)), int(bits))
+        return self._ask("odometry", "odometry", after, _motion)
 
     def health(self) -> dict[str, str]:
         """Counters and state, by name; docs/create.md says what they mean."""
-        return dict(pair.split("=", 1) for pair in self._ask("health", "health", None))
+        return self._ask("health", "health", None, lambda *pairs: dict(pair.split("=", 1) for pair in pairs))
 
     def _sent(self, message: str, after: int | None) -> Sent:
-        count, v, omega = self._ask(message, "sent", after)
-        return Sent(int(count), float(v), float(omega))
+        return self._ask(message, "sent", after, lambda count, v, omega: Sent(int(count), float(v), float(omega)))
 
-    def _ask(self, message: str, expected: str, after: int | None) -> list[str]:
+    def _ask(self, message: str, expected: str, after: int | None, made: Callable[..., Any]) -> Any:
+        """What `made` makes of the words of an answer."""
         try:
             self._socket.send((message if after is None else f"{message} after {after}").encode())
             answer = self._socket.recv(ANSWER_BYTES)
@@ -113,10 +113,20 @@ class Base:
             raise self._lost() from error
         if not answer:
             raise self._lost()
-        word, _, rest = answer.decode().partition(" ")
+        word, *rest = answer.decode(errors="replace").split() or [""]
         if word != expected:
-            raise BaseError(f"{self._path}: {rest}")
-        return rest.split()
+            raise BaseError(f"{self._path}: {' '.join(rest)}")
+        try:
+            return made(*rest)
+        except (TypeError, ValueError):
+            text = f"an answer that is none ({' '.join(rest):.40}); use a whisker-base of this release"
+            raise BaseError(f"{self._path}: {text}") from None
 
     def _lost(self) -> BaseLost:
         return BaseLost(f"{self._path}: whisker-base has gone or hangs; look at its log, connect again")
+
+
+def _motion(*words: str) -> Motion:
+    *numbers, bits = words
+    x, y, theta, xx, xy, xt, yy, yt, tt = map(float, numbers)
+    return Motion(x, y, theta, ((xx, xy, xt), (xy, yy, yt), (xt, yt, tt)), int(bits))

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 import foxglove
@@ -10,13 +9,18 @@ import numpy as np
 from foxglove.websocket import Capability, ServerListener
 
 from ..errors import UserError
+from ..fields import HUGE, Fields
+from ..guard import Guard
 from ..recording.messages import definition
+from .door import Door, hidden_address
 from .network.messages import Header, Point, Pose, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, encode
 from .standard import types
 from .standard.outlet import Outlet
 from .standard.view import KINDS, POSE_TOPIC, StandardView
 
 ENCODINGS = ["cdr", "json"]  # of what Foxglove may publish
+ORIGINS = ("https://app.foxglove.dev",)  # its page; the desktop's program, where it sends another, needs --allow-origin
+COVARIANCE = 36  # numbers
 
 
 class FoxgloveError(UserError):
@@ -47,26 +51,44 @@ class Listener(ServerListener):
 
 
 class FoxgloveServer(Outlet):
-    """FoxgloveError: the address is taken, or is none."""
+    """FoxgloveError: the address is taken, or is none. may_set_pose: clients may publish; refused: a line for each request that
+    `guard` refuses."""
 
-    def __init__(self, view: StandardView, name: str, host: str, port: int):
+    def __init__(
+        self,
+        view: StandardView,
+        name: str,
+        guard: Guard,
+        host: str,
+        port: int,
+        may_set_pose: bool,
+        refused: Callable[[str], None],
+    ):
         super().__init__(view, name)
+        hidden = hidden_address()
         self._context = foxglove.Context()
         self._channels: dict[str, foxglove.Channel] = {}
         self.open_all()
         try:
             self.server = foxglove.start_server(
                 name=f"crunchbot {name}",
-                host=host,
-                port=port,
-                capabilities=[Capability.ClientPublish],
+                host=hidden,
+                port=0,
+                capabilities=[Capability.ClientPublish] if may_set_pose else [],
                 server_listener=Listener(self),
                 supported_encodings=ENCODINGS,
                 context=self._context,
             )
         except Exception as error:  # the SDK has no class of its own for it
             text = " ".join(str(error).split())
-            raise FoxgloveError(f"{host}:{port}: {text}; choose another --host or --port") from None
+            raise FoxgloveError(f"{hidden}: {text}; see that this machine's loopback is up") from None
+        try:
+            self._door = Door(guard, host, port, (hidden, self.server.port), refused)
+        except OSError as error:
+            self.server.stop()
+            text = f"{host}:{port}: cannot be listened at ({error.strerror})"
+            raise FoxgloveError(f"{text}; choose another --host or --port") from None
+        self.port = self._door.port
 
     def open(self, topic: str, schema: str) -> None:
         text = types.definition(schema) if topic in KINDS else definition(schema)
@@ -83,6 +105,7 @@ class FoxgloveServer(Outlet):
         self.server.publish_status(text, foxglove.StatusLevel.Warning)
 
     def close(self) -> None:
+        self._door.close()
         self.server.stop()
 
 
@@ -93,10 +116,16 @@ def _pose_of(encoding: str, data: bytes) -> bytes:
     if encoding != "json":
         raise ValueError(f"encoding '{encoding}' is not read; publish JSON or CDR")
     try:
-        given = json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
-        place, covariance = given.pose.pose, list(given.pose.covariance)
-        pose = Pose(Point(**vars(place.position)), Quaternion(**vars(place.orientation)))
-        belief = PoseWithCovariance(pose, np.array(covariance, float))
-        return encode(PoseWithCovarianceStamped(Header(frame_id=given.header.frame_id), belief))
-    except (AttributeError, TypeError, KeyError, json.JSONDecodeError) as error:
+        given = Fields(json.loads(data))
+        place, belief = given.part("pose").part("pose"), given.part("pose")
+        point = Point(*(place.part("position").number(axis) for axis in "xyz"))
+        turn = Quaternion(*(place.part("orientation").number(axis) for axis in "xyzw"))
+        covariance = np.array(belief.numbers("covariance", COVARIANCE, -HUGE, HUGE))
+        frame = given.part("header").take("frame_id")
+        if not isinstance(frame, str):
+            raise given.part("header").fail("frame_id", "must be a string")
+        return encode(
+            PoseWithCovarianceStamped(Header(frame_id=frame), PoseWithCovariance(Pose(point, turn), covariance))
+        )
+    except (ValueError, RecursionError) as error:  # bytes that are no text, too
         raise ValueError(f"not a geometry_msgs/PoseWithCovarianceStamped as JSON ({error})") from None

@@ -38,6 +38,7 @@ def configure(poll_s: float) -> None:
     config.MAX_MESSAGE_SIZE, config.ITER_STREAMING = REQUEST_MOST, False
     config.THREADPOOL_SIZE = 4 * CONNECTIONS_MOST  # with those that are being closed
     Pyro5.protocol.ReceivingMessage = PlainMessage
+    Pyro5.errors.format_traceback = lambda *_, **__: []  # what lies where on this machine is nobody else's business
     known = Pyro5.serializers.serializers
     for name in [name for name in known if name != SERIALIZER]:
         del Pyro5.serializers.serializers_by_id[known.pop(name).serializer_id]

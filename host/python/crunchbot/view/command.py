@@ -5,12 +5,12 @@ import asyncio
 import contextlib
 import ipaddress
 import logging
-import sys
 import webbrowser
 from pathlib import Path
 
 from ..arguments import add_ring_owner, add_topics, add_zenoh_config
 from ..errors import UserError
+from ..guard import add_door, may_set_pose, warn_if_open
 from ..robot.played import read_bag
 from ..robot.topic_rows import read_by_table
 from ..scene import load
@@ -58,38 +58,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="a process of the robot; repeatable (default: pilot and navigator of this machine)",
     )
     add_zenoh_config(parser)
-    parser.add_argument("--port", type=_port, default=PORT, help="0 takes a free one")
-    parser.add_argument(
-        "--host",
-        type=_address,
-        default="127.0.0.1",
-        metavar="ADDRESS",
-        help="address to serve at",
-    )
-    parser.add_argument(
-        "--allow-host",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="also answer under this name, as behind a forwarded port; repeatable",
-    )
-    text = "pages may set where the robot is; on loopback they always may"
-    parser.add_argument("--allow-pose", action="store_true", help=text)
+    add_door(parser, PORT)
     parser.add_argument("--open", action="store_true", help="open the page in a browser")
     parser.set_defaults(run=run)
-
-
-def _port(text: str) -> int:
-    if not text.isdecimal() or int(text) > 65535:
-        raise argparse.ArgumentTypeError(f"{text} is not a port; give a number from 0 to 65535")
-    return int(text)
-
-
-def _address(text: str) -> str:
-    try:
-        return str(ipaddress.ip_address(text))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text} is not an address; give one such as 127.0.0.1") from None
 
 
 def run(arguments: argparse.Namespace, part: str = "") -> int:
@@ -100,7 +71,6 @@ def run(arguments: argparse.Namespace, part: str = "") -> int:
         if not is_name(name):
             raise ViewError(f"--ring {name!r}: not the name of a ring; use letters, digits, dash and dot")
     scene = None if arguments.scene is None else load(arguments.scene)
-    may_set_pose = arguments.allow_pose or ipaddress.ip_address(arguments.host).is_loopback
     source = _source(arguments)
     if arguments.file:
         wanted = [topic.removesuffix("/*") for topic in WANTED]
@@ -108,7 +78,9 @@ def run(arguments: argparse.Namespace, part: str = "") -> int:
         played = read_by_table(arguments.file, table, scene) if table else read_bag(arguments.file, wanted)
         source, scene = Playback(played), scene or played.scene
     try:
-        return asyncio.run(_serve(arguments, Hub(rings, source, scene, arguments.ring_owner, may_set_pose), part))
+        return asyncio.run(
+            _serve(arguments, Hub(rings, source, scene, arguments.ring_owner, may_set_pose(arguments)), part)
+        )
     finally:
         source.close()
 
@@ -137,8 +109,7 @@ async def _serve(arguments: argparse.Namespace, hub: Hub, part: str) -> int:
     listen(end)
     async with serving(hub, arguments.host, arguments.port, arguments.allow_host) as port:
         address = ipaddress.ip_address(arguments.host)
-        if not address.is_loopback:
-            print(f"whisker-view: {arguments.host}: anyone who reaches this address can watch", file=sys.stderr)
+        warn_if_open("whisker-view", arguments.host, "watch")
         host = "127.0.0.1" if address.is_unspecified else f"[{address}]" if address.version == 6 else str(address)
         url = f"http://{host}:{port}/{part}"
         print(url, flush=True)

@@ -16,8 +16,8 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from ..errors import UserError
+from ..guard import Guard
 from .client import Client
-from .guard import Guard
 from .hub import Hub
 from .page import HEADERS, Page
 from .places import Places, network_of

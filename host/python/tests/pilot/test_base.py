@@ -554,9 +554,9 @@ def test_messages_that_are_none_are_refused(start):
     with driver.client() as client:
         for message in ("drive 1", "drive nan 0", "drive 1 2 3", "hello", "mode sleepy", "odometry after x", "drive"):
             with pytest.raises(BaseError, match="say: "):
-                client._ask(message, "sent", None)
+                client._ask(message, "sent", None, print)
         with pytest.raises(BaseError, match="message too long; 255 letters are the most"):
-            client._ask("drive 0.2 0." + 300 * "0" + "1e300", "sent", None)  # without its end another number
+            client._ask("drive 0.2 0." + 300 * "0" + "1e300", "sent", None, print)  # without its end another number
         with pytest.raises(BaseError, match="zero byte"):
             client._ask("stop\0 drive", "sent", None)
         assert client.drive(0.2, 0.0).v_m_s == 0.2

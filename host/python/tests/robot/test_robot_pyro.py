@@ -287,4 +287,4 @@ def test_a_port_that_is_taken_is_one_line(capsys):
         code, _, err = run(capsys, "pyro", "--port", port, "--connect", "none")
     assert code == 1 and err.startswith(f"whisker: 127.0.0.1:{port}: cannot be listened on (") and err.count("\n") == 1
     code, _, err = run(capsys, "pyro", "--host", "here")
-    assert code == 2 and "invalid address value: 'here'" in err
+    assert code == 2 and "here is not an address" in err

@@ -384,12 +384,15 @@ def test_what_its_server_logs_is_not_among_its_complaints(monkeypatch, capfd):
 @pytest.mark.parametrize(
     "arguments, complaint",
     [
-        (["--port", "70000"], "70000 is not a port"),
+        (["--port", "70000"], "not a whole number from 0 to 65535"),
         (["--host", "example.org"], "example.org is not an address"),
         (["--host", "192.0.2.1", "--port", "0"], "not an address of this machine"),
         (["--ring", "a/b"], "not the name of a ring"),
         (["--ring", ""], "not the name of a ring"),
-        (["--zenoh-config", "/nosuch"], "/nosuch: no configuration of zenoh (No such file or directory); give a JSON5"),
+        (
+            ["--zenoh-config", "/nosuch"],
+            "/nosuch: no configuration of zenoh (cannot be read (No such file or directory)); give a JSON5",
+        ),
     ],
 )
 def test_bad_arguments_are_one_line(capfd, arguments, complaint):

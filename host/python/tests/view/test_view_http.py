@@ -14,7 +14,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 
-from crunchbot.view.guard import Guard
+from crunchbot.guard import Guard
 from crunchbot.view.page import Page
 from crunchbot.view.places import Places, network_of
 from crunchbot.view.server import PAGES_MAX

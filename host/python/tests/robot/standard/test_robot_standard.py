@@ -4,14 +4,17 @@ import asyncio
 import contextlib
 import json
 import math
+import socket
 import struct
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from linkkit import free_endpoint
 from websockets.asyncio.client import connect
+from websockets.exceptions import InvalidStatus
 
 from crunchbot.robot.network import messages as m
 from crunchbot.robot.network.link import Link
@@ -149,9 +152,9 @@ class FoxgloveClient:
 
 
 @contextlib.contextmanager
-def server(folder, endpoint: str):
-    words = [sys.executable, "-m", "crunchbot.cli", "foxglove", folder, "--port", "0", "--connect", endpoint]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+def server(folder, endpoint: str, *more: str, errors=None):
+    words = [sys.executable, "-m", "crunchbot.cli", "foxglove", folder, "--port", "0", "--connect", endpoint, *more]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=errors, text=True) as process:
         try:
             yield int(process.stdout.readline().split(": ")[0].rpartition(":")[2])
         finally:
@@ -221,3 +224,53 @@ def test_a_port_that_is_taken_is_one_line(tmp_path):
     with server(tmp_path / "scene", free_endpoint()) as port:
         done = subprocess.run([*words, str(port)], capture_output=True, text=True, timeout=60)
     assert done.returncode == 1 and done.stderr.count("\n") == 1 and "choose another --host or --port" in done.stderr
+
+
+async def first_said(port: int, **headers: str) -> dict:
+    """What the server says first to a client with these headers; InvalidStatus when it is refused."""
+    options = {"subprotocols": ["foxglove.sdk.v1"], "max_size": None, "additional_headers": headers}
+    async with connect(f"ws://127.0.0.1:{port}", **options) as socket:
+        return json.loads(await socket.recv())
+
+
+def asked(port: int, fields: str) -> str:
+    """The answer to a request with these header fields."""
+    with socket.create_connection(("127.0.0.1", port)) as plug:
+        plug.sendall(f"GET / HTTP/1.1\r\n{fields}\r\n\r\n".encode())
+        return plug.makefile().read()
+
+
+def test_a_page_of_a_stranger_is_not_answered(tmp_path):
+    """Any page that is open in the user's browser can connect here."""
+    write(tmp_path / "scene", SCENE)
+    own = "http://foxglove.example:8080"
+    with (
+        open(tmp_path / "err", "w") as errors,
+        server(tmp_path / "scene", free_endpoint(), "--allow-origin", own, errors=errors) as port,
+    ):
+        for origin in ("http://evil.example", "null", "http://evil.example"):
+            with pytest.raises(InvalidStatus) as refused:
+                asyncio.run(first_said(port, Origin=origin))
+            assert refused.value.response.status_code == 403
+        assert "this Host is not served" in asked(port, "Host: evil.example\r\nUpgrade: websocket")
+        assert "a WebSocket is here" in asked(port, "Host: 127.0.0.1")
+        assert "Host or Origin is given twice" in asked(port, "Host: 127.0.0.1\r\nHost: evil.example")
+        assert "not a request" in asked(port, "Host")
+        for origin in ("https://app.foxglove.dev", own):
+            assert "clientPublish" in asyncio.run(first_said(port, Origin=origin))["capabilities"]
+        listening = {line.split()[1] for line in Path("/proc/net/tcp").read_text().splitlines()[1:]}
+        assert f"0100007F:{port:04X}" in listening
+    lines = (tmp_path / "err").read_text().splitlines()
+    assert len(lines) == 5 and all("foxglove: a connection is refused: " in line for line in lines)
+
+
+@pytest.mark.parametrize("more, may", [([], False), (["--allow-pose"], True)])
+def test_a_door_that_is_open_says_so_and_takes_poses_with_consent_alone(tmp_path, more, may):
+    write(tmp_path / "scene", SCENE)
+    with (
+        open(tmp_path / "err", "w") as errors,
+        server(tmp_path / "scene", free_endpoint(), "--host", "0.0.0.0", *more, errors=errors) as port,
+    ):
+        assert ("clientPublish" in asyncio.run(first_said(port))["capabilities"]) == may
+    what = "watch, and set the pose" if may else "watch"
+    assert (tmp_path / "err").read_text() == f"whisker: 0.0.0.0: anyone who reaches this address can {what}\n"
