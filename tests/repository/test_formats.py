@@ -90,7 +90,7 @@ def folder(tmp_path_factory) -> Path:
     arena = dataclasses.replace(arena, unknown=((0.1, 0.1, 0.2, 0.2),))
     cells = np.zeros((10, 10), np.uint8)
     sensor = SensorTable("light", (0.0, 0.0), 0.0, 0.0, cells, 0.3, np.array([0.0, 1.0]), np.array([[1.0]]))
-    prior = scene_files.Prior("gaussian", (1.0, 1.0, 0.0), (0.1, 0.1, 0.1))
+    prior = scene_files.Prior("gaussian", (-0.6, 3.36, 0.0), (0.1, 0.1, 0.1))
     robot = dataclasses.replace(robot, sensors=(sensor,))
     whole = scene_files.Scene(arena, robot, prior, origin=(-1.0, 2.0, 0.5))
     rows = made.observations

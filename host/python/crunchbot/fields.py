@@ -82,7 +82,7 @@ class Fields:
         numbers = array.dtype.kind in "iuf" and array.ndim == (dimensions if array.size else 1)
         if not numbers or not ((low <= array) & (array <= high)).all():
             wanted = f"numbers from {low:g} to {high:g} in lists of depth {dimensions}"
-            raise self.fail(name, f"must be {wanted}, not {_shown(value)}")
+            raise self.fail(name, f"must be {wanted}, not {_wrong_item(value, dimensions, low, high) or _shown(value)}")
         return array.astype(np.float64)
 
     def part(self, name: str) -> "Fields":
@@ -95,12 +95,25 @@ class Fields:
         return [Fields(item, f"{self._path(name)}[{n}]") for n, item in enumerate(value)]
 
     def _within(self, name: str, value: Any, low: float, high: float, wanted: str) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        if not _is_number(value, low, high):
             raise self.fail(name, f"must be {wanted} from {low:g} to {high:g}, not {_shown(value)}")
         return float(value)
 
     def _path(self, name: str) -> str:
         return f"{self._place}.{name}" if self._place else name
+
+
+def _is_number(value: Any, low: float, high: float) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
+
+
+def _wrong_item(value: Any, depth: int, low: float, high: float, place: tuple[int, ...] = ()) -> str:
+    """The first item of nested lists that is no number in the range, and where it is, from 1; empty: there is none."""
+    if depth == 0:
+        at = ".".join(map(str, place))
+        return "" if _is_number(value, low, high) else f"{_shown(value)} as number {at}"
+    items = enumerate(value, 1) if isinstance(value, list) else ()
+    return next(filter(None, (_wrong_item(item, depth - 1, low, high, (*place, n)) for n, item in items)), "")
 
 
 def _shown(value: Any) -> str:

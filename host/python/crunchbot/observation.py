@@ -141,6 +141,11 @@ class Row(Mapping):
         numbers = [v if k == VALUE else 0.0 for v, k in zip(cells, found, strict=True)]
         return cls(kind, t_s, np.array(motion, float), names, np.array(found, np.uint8), np.array(numbers, float))
 
+    @property
+    def t_text(self) -> str:
+        """Its time as the files hold it."""
+        return f"{self.t_s:.10g}"
+
     def __getitem__(self, name: str) -> float | None:
         if name == TIME:
             return self.t_s

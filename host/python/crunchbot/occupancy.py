@@ -13,7 +13,7 @@ import numpy as np
 from .fields import Fields
 from .files import UnreadableError, read_text
 from .images import Grey, read_grey
-from .scene_table import LARGEST_M, SceneError
+from .scene_table import ANGLE_MOST, LARGEST_M, SceneError
 
 Box = tuple[float, float, float, float]  # x0, y0, x1, y1
 Pose = tuple[float, float, float]
@@ -34,6 +34,7 @@ class Occupancy:
     origin: Pose
     solid: tuple[Box, ...]
     unknown: tuple[Box, ...]
+    odd: str = ""  # a line that says what is strange, but allowed
 
 
 def read_map(path: str | Path) -> Occupancy:
@@ -41,6 +42,8 @@ def read_map(path: str | Path) -> Occupancy:
     path = Path(path)
     try:
         return _read(path)
+    except SceneError:
+        raise
     except (UnreadableError, ValueError) as error:
         raise SceneError(f"{path}: {error}; give a map server's YAML file and image") from error
 
@@ -49,9 +52,14 @@ def _read(path: Path) -> Occupancy:
     fields = Fields(_parsed(path))
     resolution = fields.number("resolution", FINEST_M, LARGEST_M)
     origin = fields.array("origin", 1, -LARGEST_M, LARGEST_M)
-    if origin.shape != (3,):
-        raise ValueError("field 'origin' must be x, y and yaw")
-    mode = fields.text("mode", *MODES) if fields.has("mode") else MODES[0]
+    if origin.shape not in ((2,), (3,)):
+        raise fields.fail("origin", "must be x, y and yaw")
+    origin = np.append(origin, 0.0)[:3]
+    if abs(origin[2]) > ANGLE_MOST:
+        raise fields.fail("origin", f"must have a yaw in rad from {-ANGLE_MOST:g} to {ANGLE_MOST:g}, not {origin[2]:g}")
+    mode = fields.text("mode").lower() if fields.has("mode") else MODES[0]
+    if mode not in MODES:
+        raise fields.fail("mode", f"must be {' or '.join(map(repr, MODES))}, not {fields.take('mode')!r}")
     limits = [fields.number(name, 0.0, 1.0) for name in ("free_thresh", "occupied_thresh")]
     if limits[0] > limits[1]:
         raise ValueError("field 'free_thresh' is above occupied_thresh")
@@ -68,8 +76,16 @@ def _read(path: Path) -> Occupancy:
     if max(size) > LARGEST_M:
         raise ValueError(f"field 'resolution' makes the map {max(size):g} m long, {LARGEST_M:g} m are the most")
     kinds = cells_of(grey, mode, bool(negate), *limits)
+    shares = [float((kinds == kind).mean()) for kind in (FREE, SOLID, UNKNOWN)]
+    found = (
+        f"no cell is {{}}: {shares[FREE]:.0%} free, {shares[SOLID]:.0%} solid, {shares[UNKNOWN]:.0%} unknown by mode "
+        f"{mode}, negate {int(negate)}, free_thresh {limits[0]:g} and occupied_thresh {limits[1]:g}; mend these fields"
+    )
+    if shares[FREE] in (0.0, 1.0):  # no place to be, or nothing to meet
+        raise SceneError(f"{path}: {found.format('solid' if shares[FREE] else 'free')}, or the image")
+    odd = "" if shares[SOLID] else f"{path}: {found.format('solid')} if there are walls"
     solid, unknown = (_scaled(boxes_of(kinds == kind), rows, resolution) for kind in (SOLID, UNKNOWN))
-    return Occupancy(size, resolution, tuple(map(float, origin)), solid, unknown)
+    return Occupancy(size, resolution, tuple(map(float, origin)), solid, unknown, odd)
 
 
 def _parsed(path: Path) -> object:
@@ -86,14 +102,19 @@ def _parsed(path: Path) -> object:
 
 
 def cells_of(grey: Grey, mode: str, negate: bool, free: float, occupied: float) -> np.ndarray:
-    """(rows, columns) NOWHERE: Pose = (0.0, 0.0, 0.0)  # of a frame in itself
-    FREE, SOLID or UNKNOWN; between the thresholds nothing is known."""
-    level = np.arange(256)
+    """(rows, columns) of FREE, SOLID or UNKNOWN, as nav2_map_server has 0, 100 and what is neither: in mode "trinary" it takes
+    the alpha of an image for a fourth colour, in "scale" both thresholds are on the scale, "raw" is not negated."""
+    seen, level = grey.level, np.arange(256)
+    if mode == "trinary" and grey.alpha is not None:
+        seen = ((3 * seen.astype(np.uint16) + grey.alpha + 2) // 4).astype(np.uint8)
     shade = level if negate else 255 - level
     share = np.where(level <= 100, level / 100.0, np.nan) if mode == "raw" else shade / 255.0
     table = np.full(256, UNKNOWN, np.uint8)
     table[share < free], table[share > occupied] = FREE, SOLID
-    kinds = table[grey.level]
+    if mode == "raw" or (mode == "scale" and free < occupied):
+        percent = np.rint(100.0 * (share if mode == "raw" else (share - free) / (occupied - free)))
+        table[percent <= 0.0], table[percent >= 100.0] = FREE, SOLID
+    kinds = table[seen]
     if mode == "scale" and grey.opaque is not None:
         kinds[~grey.opaque] = UNKNOWN
     return kinds
@@ -132,6 +153,12 @@ def placed(
         raise ValueError(f"field 'origin': the yaw must be that of the origin in arena.toml, {origin[2]:g}")
     high_x, high_y = x + occupancy.size_m[0], y + occupancy.size_m[1]
     wide, high = size_m
+    if min(high_x, wide) <= max(x, 0.0) or min(high_y, high) <= max(y, 0.0):
+        area = f"x {x:g} to {high_x:g} and y {y:g} to {high_y:g} m"
+        raise ValueError(
+            f"field 'origin' lays the map on {area}, beside the arena of {wide:g} x {high:g} m from (0, 0); give the "
+            "corner's place in arena.toml's frame, or leave arena.toml out"
+        )
     margins = [(0.0, 0.0, x, high), (high_x, 0.0, wide, high), (x, 0.0, high_x, y), (x, high_y, high_x, high)]
     solid, unknown = (
         [(a + x, b + y, c + x, d + y) for a, b, c, d in boxes] for boxes in (occupancy.solid, occupancy.unknown)

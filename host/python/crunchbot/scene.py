@@ -17,7 +17,7 @@ from .files import UnreadableError
 from .images import nearest_levels, read_grey
 from .observation import Column, Layout, Quantity
 from .occupancy import NOWHERE, Box, Pose, from_map, placed, read_map, spread_on_map, to_map
-from .scene_table import FARTHEST_M, LARGEST_M, SceneError, Table
+from .scene_table import ANGLE_MOST, FARTHEST_M, LARGEST_M, SceneError, Table
 from .sensor_tables import SensorTable, read_sensors, write_sensor
 
 __all__ = ["LARGEST_M", "SceneError"]  # beside what is defined here
@@ -99,6 +99,7 @@ class Scene:
     prior: Prior | None = None
     simulated: tuple[str, ...] = field(default=(), compare=False)  # more lines of `flat`; no part of the folder
     origin: Pose = NOWHERE  # of the arena's frame in the map's
+    odd: str = field(default="", compare=False)  # a line that says what is strange in its map
 
     @cached_property
     def layout(self) -> Layout:
@@ -112,12 +113,16 @@ class Scene:
 
     def warnings(self) -> list[str]:
         """What is odd but allowed, one line each."""
-        if self.prior is None or self.prior.mean is None:
-            return []
-        if not (fault := self.fault_at(self.prior.mean)):
-            return []
-        x, y, _ = self.prior.mean
-        return [f"{PRIOR}: mean ({x:g}, {y:g}) is {fault}; the belief is clipped to free space"]
+        out, size = [self.odd] if self.odd else [], self.arena.size_m
+        reach = {w.name: math.hypot(*(w.tip_m or w.base_m)) + (w.length_m or 0.0) for w in self.robot.whiskers}
+        far = [name for name, metres in reach.items() if metres > math.hypot(*size)]
+        if far:
+            text = f"{ROBOT}: whisker '{far[0]}' ends {reach[far[0]]:g} m from the robot's centre"
+            out += [f"{text} in an arena of {size[0]:g} x {size[1]:g} m; give its places and length_m in metres"]
+        if self.prior and self.prior.mean and (fault := self.fault_at(self.prior.mean)):
+            x, y, _ = self.prior.mean
+            out += [f"{PRIOR}: mean ({x:g}, {y:g}) is {fault}; the belief is clipped to free space"]
+        return out
 
     def fault_at(self, pose: Pose) -> str:
         """Where a pose on the map is, if no robot can be there; else empty."""
@@ -163,7 +168,23 @@ def load(path: str | Path, map_file: str | Path | None = None) -> Scene:
         _ = scene.layout
     except ValueError as error:
         raise SceneError(f"{folder / ROBOT}: {error}; rename a whisker, a texture or a sensor") from None
+    _judge(folder, scene, map_file)
     return scene
+
+
+def _judge(folder: Path, scene: Scene, map_file: str | Path | None) -> None:
+    """SceneError where a robot can be nowhere, or is said to be where nothing is."""
+    arena, radius, size = scene.arena, scene.robot.body_radius_m, scene.arena.size_m
+    whole = f"{size[0]:g} x {size[1]:g} m"
+    if not has_place(size, arena.obstacles, radius / math.sqrt(2.0)):  # the square within the body
+        text = f"no place is free for a body with body_radius_m {radius:g} in {whole}"
+        raise SceneError(f"{map_file or folder / ARENA}: {text}; take obstacles out, or give all sizes in metres")
+    if scene.prior and scene.prior.mean:
+        prior = in_arena(scene.prior, scene.origin)
+        away = [max(-p, p - side, 0.0) / sigma for p, side, sigma in zip(prior.mean, size, prior.sigma, strict=False)]
+        if math.hypot(*away) > math.sqrt(-2.0 * math.log(NO_MASS)):
+            text = f"'mean' ({scene.prior.mean[0]:g}, {scene.prior.mean[1]:g}) is {scene.fault_at(scene.prior.mean)}"
+            raise SceneError(f"{folder / PRIOR}: {text}; give a pose inside, in that frame")
 
 
 def load_robot(path: str | Path) -> Robot:
@@ -183,9 +204,14 @@ def _read(folder: Path, map_file) -> Scene:
         return Scene(mapped, robot, prior, origin=origin)
     occupancy = read_map(map_file)
     robot = _robot(Table.read(folder / ROBOT), occupancy.size_m)
+    wide, odd = 2.0 * robot.body_radius_m, occupancy.odd
+    if 0.0 < wide < occupancy.resolution_m:
+        size = " x ".join(f"{side:g}" for side in occupancy.size_m)
+        odd = f"{map_file}: field 'resolution' makes a pixel {occupancy.resolution_m:g} m wide, the robot is {wide:g}, "
+        odd += f"and the map {size} m; give metres a pixel"
     arena = Arena(occupancy.size_m, max(occupancy.size_m), ("NONE",), (NOT_KNOWN,), occupancy.solid, occupancy.unknown)
     feeling = replace(robot, whiskers=tuple(robot.of_role("object")))  # no floor is known for the others
-    return Scene(arena, feeling, prior, origin=occupancy.origin)
+    return Scene(arena, feeling, prior, origin=occupancy.origin, odd=odd)
 
 
 def _with_map(arena: Arena, map_file, origin: Pose) -> Arena:
@@ -193,6 +219,8 @@ def _with_map(arena: Arena, map_file, origin: Pose) -> Arena:
         solid, unknown = placed(read_map(map_file), arena.size_m, origin)
     except ValueError as error:
         raise error if isinstance(error, SceneError) else SceneError(f"{map_file}: {error}") from error
+    if not has_place(arena.size_m, (*solid, *unknown), 0.0):
+        raise SceneError(f"{map_file}: no free cell is inside the arena of {arena.size_m} m; mend the field 'origin'")
     return replace(arena, obstacles=solid, unknown=unknown)
 
 
@@ -234,6 +262,23 @@ def write(path: str | Path, scene: Scene) -> None:
         _write(folder / PRIOR, _given(prior))
 
 
+def has_place(size: tuple[float, float], boxes: tuple[Box, ...], half: float) -> bool:
+    """Whether a square of this half side is free anywhere. Its leftmost free places are right of a box, or of the wall;
+    those in the middle are tried first, for most arenas have one there."""
+    grown = np.array(boxes).reshape(-1, 4) + np.array([-half, -half, half, half])
+    places = sorted({half, *grown[:, 2].tolist()})
+    for x in places[len(places) // 2 :] + places[: len(places) // 2]:
+        beside = grown[(grown[:, 0] <= x) & (x < grown[:, 2])]
+        y = half
+        for low, high in sorted(beside[:, [1, 3]].tolist()):
+            if low > y:
+                break
+            y = max(y, high)
+        if half <= x < size[0] - half and y < size[1] - half:
+            return True
+    return False
+
+
 def _corners(box: Box) -> dict:
     return {"min_m": box[:2], "max_m": box[2:]}
 
@@ -255,6 +300,7 @@ def _line(word: str, *values) -> str:
 
 
 TINY = 1e-9
+NO_MASS = 0.01  # of a Gaussian, that lies as far out as the arena begins
 
 
 def _arena(table: Table) -> tuple[Arena, Pose]:
@@ -264,7 +310,7 @@ def _arena(table: Table) -> tuple[Arena, Pose]:
     textures = _textures(table)
     floor = _floor(table, size, tile, textures)
     wall = _surface(table, "wall")
-    origin = table.numbers("origin", 3, -LARGEST_M, LARGEST_M) if "origin" in table.content else NOWHERE
+    origin = _pose(table, "origin", LARGEST_M) if "origin" in table.content else NOWHERE
     surfaces: list[tuple[Box, str]] = []
     obstacles, unknown = (_boxes(table, key, size, surfaces) for key in ("obstacle", "unknown"))
     table.done()
@@ -316,9 +362,11 @@ def _floor(table: Table, size, tile: float, textures) -> tuple[str, ...]:
         )
     image = isinstance(table.content.get("floor"), str)
     rows = _floor_image(table, textures) if image else table.strings("floor")
+    letters = {name[0] for name in textures} | {NOT_KNOWN}
+    other_case = {ord(c.swapcase()): c for c in letters if len(c.swapcase()) == 1 and c.swapcase() not in letters}
+    rows = tuple(row.translate(other_case) for row in rows)
     if len(rows) != rows_wanted:
         raise table.fail("floor", f"has {len(rows)} rows; size_m and tile_m ask for {rows_wanted}")
-    letters = {name[0] for name in textures} | {NOT_KNOWN}
     for number, row in enumerate(rows, start=1):
         if len(row) != columns_wanted:
             raise table.fail("floor", f"row {number} has {len(row)} tiles; size_m and tile_m ask for {columns_wanted}")
@@ -369,11 +417,18 @@ def _whisker(entry: Table) -> Whisker:
             name,
             role,
             base_m=entry.numbers("base_m", 2, -LARGEST_M, LARGEST_M),
-            yaw_rad=entry.number("yaw_rad", -10.0, 10.0),
+            yaw_rad=entry.number("yaw_rad", -ANGLE_MOST, ANGLE_MOST),
             length_m=entry.number("length_m", TINY, LARGEST_M),
         )
     entry.done()
     return whisker
+
+
+def _pose(table: Table, key: str, far: float) -> Pose:
+    pose = table.numbers(key, 3, -far, far)
+    if abs(pose[2]) > ANGLE_MOST:
+        raise table.fail(key, f"must have a heading in rad from {-ANGLE_MOST:g} to {ANGLE_MOST:g}, not {pose[2]:g}")
+    return pose
 
 
 def _prior(table: Table) -> Prior:
@@ -381,7 +436,7 @@ def _prior(table: Table) -> Prior:
     if kind == "uniform":
         table.done()
         return Prior(kind)
-    mean = table.numbers("mean", 3, -FARTHEST_M, FARTHEST_M)
+    mean = _pose(table, "mean", FARTHEST_M)
     sigma = table.numbers("sigma", 3, TINY, LARGEST_M)
     table.done()
     return Prior(kind, mean, sigma)

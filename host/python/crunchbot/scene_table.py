@@ -10,6 +10,7 @@ from .files import UnreadableError, read_toml
 
 LARGEST_M = 1000.0
 FARTHEST_M = 3 * LARGEST_M  # of a place on a map: as far as its arena's origin, and across the arena
+ANGLE_MOST = 10.0  # rad: more than a turn and a half is in degrees
 
 
 class SceneError(UserError, ValueError):

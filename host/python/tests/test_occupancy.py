@@ -44,7 +44,7 @@ LEVELS = np.array([[0, 60, 89, 90, 150, 205, 206, 255]], np.uint8)
     "mode, negate, kinds",
     [
         ("trinary", False, "SSSUUUFF"),
-        ("scale", False, "SSSUUUFF"),
+        ("scale", False, "SSSUUFFF"),  # 205 is 0.02 % up the scale, which is a 0
         ("trinary", True, "FUUUUSSS"),
         ("raw", False, "FUSSUUUU"),
     ],
@@ -93,7 +93,7 @@ def test_beside_an_arena_what_the_map_does_not_show_is_unknown(tmp_path):
 
 BROKEN = {
     "resolution: 0.1": ("resolution: -1", "field 'resolution'"),
-    "origin: [-1.0, 0.5, 0.0]": ("origin: [1, 2]", "field 'origin' must be x, y and yaw"),
+    "origin: [-1.0, 0.5, 0.0]": ("origin: [1]", "field 'origin' must be x, y and yaw"),
     "negate: 0": ("negate: 7", "field 'negate'"),
     "occupied_thresh: 0.65": ("occupied_thresh: 0.1", "field 'free_thresh' is above"),
     "free_thresh: 0.196": ("free_thresh: .nan", "field 'free_thresh'"),

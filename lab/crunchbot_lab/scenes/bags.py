@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from crunchbot.nav.observations import Observations, joined
+from crunchbot.nav.observations import Observations, joined, observed
 from crunchbot.observation import Quantity, parse
 from crunchbot.recording.mcapfile import RecordingError
 from crunchbot.recording.rosbag import open_bag
@@ -14,7 +14,6 @@ from crunchbot.robot.network.inbox import Received
 from crunchbot.robot.network.messages import Observation, PoseStamped
 from crunchbot.robot.network.rows import Follower
 from crunchbot.robot.network.streams import Envelope
-from crunchbot.robot.observed import observed
 from crunchbot.robot.played import BagError
 from crunchbot.robot.played import read_bag as played_bag
 from crunchbot.robot.topic_rows import read_by_table

@@ -35,7 +35,7 @@ def write_scene(path: str | Path, scene: Scene, observations: Observations) -> N
     header = [TIME, *ODOMETRY, *layout.of(Quantity.TEXTURE), *layout.of(Quantity.DISTANCE)]
     columns = [observations.t_text, *_numbers(observations.odometry)]
     columns += _cells(observations.texture.reshape(len(observations.t_s), -1), {"nan": "", "-inf": "inf"})
-    columns += _cells(np.round(observations.radial_m * 1000.0, 3), {"inf": "", "-inf": "inf"})
+    columns += _cells(np.round(observations.radial_m * 1000.0, 3), {"inf": ""})
     if observations.own is not None:
         header += layout.of(Quantity.READING)
         columns += _cells(observations.own, {"nan": ""})

@@ -6,6 +6,7 @@ import sys
 
 from ..arguments import add_output
 from ..nav import localise
+from ..nav.faults import row_faults
 from ..nav.localise import SettingError
 from ..scene import PRIOR, SceneError, load
 
@@ -48,7 +49,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise SceneError(f'{arguments.scene}/{PRIOR}: missing; write one, kind = "uniform" if nothing is known')
     for warning in scene.warnings():
         print(f"whisker: warning: {warning}", file=sys.stderr)
-    observations = localise.read_observations(localise.observations_path(arguments.scene), scene)
+    path = localise.observations_path(arguments.scene)
+    observations = localise.read_observations(path, scene)
+    for fault in row_faults(observations, scene.robot):
+        print(f"whisker: warning: {path}: {fault}", file=sys.stderr)
     settings, regions = _settings(arguments.set), localise.REGION_ROWS
     result = localise.run(arguments.filter, scene, observations, settings, arguments.seed, regions)
     for warning in localise.warnings(result):

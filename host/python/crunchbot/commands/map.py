@@ -2,9 +2,12 @@
 
 import argparse
 import json
+import sys
 
 from ..arguments import add_output
 from ..nav import mapping
+from ..nav.faults import row_faults
+from ..scene import OBSERVATIONS
 
 EXAMPLE = "whisker map examples/scene --out touched --json"
 
@@ -20,6 +23,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     robot, textures, rows = mapping.read(arguments.scene)
+    for fault in row_faults(rows, robot):
+        print(f"whisker: warning: {arguments.scene}/{OBSERVATIONS}: {fault}", file=sys.stderr)
     mapped = mapping.run(robot, textures, rows, not arguments.no_lattice, arguments.json)
     reported = mapping.summary(mapped, mapping.write_map(arguments.out, mapped, arguments.overwrite))
     print(json.dumps(reported) if arguments.json else "\n".join(f"{key}: {value}" for key, value in reported.items()))

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from ..errors import UserError
 from ..native import as_doubles, doubles, ffi, lib, octets, pointer
-from ..observation import NORMAL, Quantity, Row
+from ..observation import Row
 from ..occupancy import from_map, spread_on_map, to_map
 from ..scene import Prior, Scene, in_arena
 from ..sensor_tables import SensorTable
-from .observations import Observations
+from .observations import Observations, observed
 
 FAVOURITE, SPARE = "adaptive", "grid"
 SENSOR_UNKNOWN = 255
@@ -154,14 +154,8 @@ class Filter:
 
     def step(self, row: Row | Mapping[str, float | None]) -> Estimate:
         """Take one row. KeyError when a column of the scene's layout is missing; readings and directions may be."""
-        row, layout = row if isinstance(row, Row) else Row.of(row), self.scene.layout
-        texture = row.read(layout.of(Quantity.TEXTURE)).reshape(self._tips, self._classes)
-        radial = row.read(layout.of(Quantity.DISTANCE), empty=math.inf) / 1000.0
-        own = np.full(self._own, math.nan)
-        readings = row.find(layout.of(Quantity.READING))
-        own[: len(readings)] = readings
-        normal = row.find(layout.of(Quantity.NORMAL)).reshape(self._rays, len(NORMAL))
-        return self.step_values(row.t_s, row.motion, texture, radial, own, normal)
+        one = observed(row if isinstance(row, Row) else Row.of(row), self.scene, self._own)
+        return to_estimate(self.replay(one, 0, 1)[0][0])
 
     def step_values(
         self,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..observation import NORMAL, ODOMETRY, POINT, TIME, TRUTH, Quantity
+from ..observation import NORMAL, ODOMETRY, POINT, TIME, TRUTH, Quantity, Row
 from ..scene import OBSERVATIONS, Scene
 from ..tables import number, numbers, read_columns, require_columns
 
@@ -30,9 +30,9 @@ class Observations:
         return len(self.t_s)
 
     def in_order(self) -> np.ndarray:
-        """(n,) whether a row is later than all before it."""
-        latest = np.fmax.accumulate(np.concatenate([[-np.inf], self.t_s]))[:-1]
-        return self.t_s > latest
+        """(n,) whether a row is later than all before it; one whose time is no number is not."""
+        t_s = np.where(np.isfinite(self.t_s), self.t_s, np.nan)
+        return t_s > np.fmax.accumulate(np.concatenate([[-np.inf], t_s]))[:-1]
 
 
 def joined(parts: Sequence[Observations]) -> Observations:
@@ -54,6 +54,20 @@ def stretch(rows: Observations, first: int, last: int) -> Observations:
     return Observations(**cut)
 
 
+def observed(row: Row, scene: Scene, own: int = 0) -> Observations:
+    """A row as Observations of one, with so many values of own sensors, of which the scene's come first. KeyError when a column
+    of the scene's textures or distances is missing."""
+    tips, rays, layout = len(scene.robot.of_role("texture")), len(scene.robot.of_role("object")), scene.layout
+    texture = row.read(layout.of(Quantity.TEXTURE)).reshape(1, tips, len(scene.arena.textures))
+    radial = row.read(layout.of(Quantity.DISTANCE), empty=math.inf).reshape(1, rays) / 1000.0
+    touched = ((Quantity.NORMAL, len(NORMAL)), (Quantity.POINT, len(POINT)))
+    normal, point = (row.find(layout.of(quantity)).reshape(1, rays, width) for quantity, width in touched)
+    readings = row.find(layout.of(Quantity.READING))[None]
+    values = np.hstack([readings, np.full((1, max(own - readings.shape[1], 0)), math.nan)])
+    motion, values = np.asarray(row.motion, np.float64)[None], values if values.size else None
+    return Observations(np.array([row.t_s]), [row.t_text], motion, texture, radial, None, values, normal, point)
+
+
 def observations_path(folder: str | Path) -> Path:
     return Path(folder) / OBSERVATIONS
 
@@ -61,7 +75,7 @@ def observations_path(folder: str | Path) -> Path:
 def read_observations(path: str | Path, scene: Scene) -> Observations:
     """Read the file; TableError when a column of the scene's whiskers is missing or the structure is broken."""
     tips, rays, own = (scene.layout.of(q) for q in (Quantity.TEXTURE, Quantity.DISTANCE, Quantity.READING))
-    text = read_columns(path, [TIME, *ODOMETRY, *tips, *rays, *own])
+    text = read_columns(path, [TIME, *ODOMETRY, *tips, *rays, *own], (*TRUTH, *scene.layout.names))
     rows, shape = len(text[TIME]), (len(scene.robot.of_role("texture")), len(scene.arena.textures))
     texture = np.array([_column(text[key], _texture_cell) for key in tips]).reshape(*shape, rows)
     radial = np.array([_column(text[key], _radial_cell) for key in rays]).reshape(len(rays), rows)
@@ -107,10 +121,10 @@ _own_cell = _texture_cell  # of a sensor of the user's own
 
 
 def _radial_cell(cell: str) -> float:
-    """Empty: no contact; nan: not read; what is no distance becomes -inf, a bad cell."""
+    """Empty or inf (as REP 117 has it): no contact; nan: not read; what is no number becomes -inf, a bad cell."""
     if cell == "":
         return math.inf
     if cell.lower() == "nan":
         return math.nan
     value = number(cell)
-    return value / 1000.0 if math.isfinite(value) else -math.inf
+    return -math.inf if math.isnan(value) else value / 1000.0

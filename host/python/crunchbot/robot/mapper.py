@@ -16,7 +16,7 @@ import numpy as np
 from ..nav.filters import COMPONENT
 from ..nav.mapper import PATCH_M, Mapper, TouchMap
 from ..nav.mapping import left_by, textures_in, write_map
-from ..nav.observations import Observations, joined
+from ..nav.observations import Observations, joined, observed
 from ..observation import has_normals
 from ..scene import Arena, Robot, Scene
 from .journal import Journal
@@ -28,7 +28,7 @@ from .network.messages import Header, Localisation, Observation, PoseWithCovaria
 from .network.ros import MAP_FRAME, MapMetaData, OccupancyGrid, Pose
 from .network.row_checks import RowChecks
 from .network.rows import Follower, Step
-from .observed import observed
+from .row_watch import RowWatch
 
 NAME = "mapper"  # of the process, and of the filter in its answers
 MAP_NS, BELIEF_NS = 1_000_000_000, 500_000_000  # of the bridge's clock, between two maps and two beliefs
@@ -68,6 +68,7 @@ class MapperProcess:
         """Nothing is known."""
         self._follower, self._scene, self._mapper = Follower(), None, None
         self._rows: list[Observations] = []
+        self._watch = RowWatch(self._robot)
         self._tables: list[np.ndarray] = []
         self._steps_us: list[np.ndarray] = []
         self._now_ns = self._map_due_ns = self._belief_due_ns = 0
@@ -113,7 +114,7 @@ class MapperProcess:
         return self.counters()
 
     def _last_error(self) -> str:
-        return self._inbox.last_error or self._journal.note or self._lost_at
+        return self._inbox.last_error or self._journal.note or self._lost_at or self._watch.fault
 
     def _recall(self) -> None:
         """Takes the rows of the journal again, without a word about each."""
@@ -156,6 +157,7 @@ class MapperProcess:
         if self._mapper.frame != part:
             self._lost_at = f"lost at {t_s:.1f} s: the robot was carried off; a new map began"
         self._rows.append(taken)
+        self._watch.take(taken)
         self._tables.append(table)
         self._steps_us.append(step_us)
         self._now_ns, self._seq = step.row.header.stamp.ns, step.row.seq

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ..nav.localise import Estimate
+from ..nav.observations import observed
 from ..observation import has_normals
 from ..outputs import put
 from ..scene import Prior, Scene
@@ -31,6 +32,7 @@ from .network.messages import Header, Localisation, PoseWithCovariance, PoseWith
 from .network.ros import MAP_FRAME
 from .network.row_checks import RowChecks
 from .network.rows import Follower, Step
+from .row_watch import RowWatch
 from .track import Track
 
 BELIEF_NS = 500_000_000  # 2 Hz of the bridge's clock
@@ -66,7 +68,7 @@ class Navigator:
         self._inbox = link.subscribe(ROWS, initial_pose.TOPIC, judge=RowChecks(scene))
         self._reported: Prior | None = None
         self._reported_error = ""
-        self._follower = Follower()
+        self._follower, self._watch = Follower(), RowWatch(scene.robot)
         self._memory = Memory(settings.checkpoint, scene, settings.filters)
         self._beliefs_before: dict[str, np.ndarray] = {}
         self._tracks: list[Track] = []
@@ -115,7 +117,7 @@ class Navigator:
         return max(1, CATCH_UP_S // self._weigh_s) if self._weigh_s else 1
 
     def _last_error(self) -> str:
-        return self._inbox.last_error or self._reported_error or self._memory.note
+        return self._inbox.last_error or self._reported_error or self._memory.note or self._watch.fault
 
     def _take_rows(self, received: list[Received], stack: ExitStack) -> None:
         if not self._tracks:
@@ -159,6 +161,8 @@ class Navigator:
         if not self._tracks:
             self._begin(stack, has_normals(step.row.names))
             self._begin_from_reported()
+        for row in (*step.lead(), step.last()):
+            self._watch.take(observed(row, self._scene))
         self._now_ns = step.row.header.stamp.ns
         header = Header.at(self._now_ns, MAP_FRAME)
         for track in self._tracks:

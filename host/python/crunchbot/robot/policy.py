@@ -7,13 +7,13 @@ import numpy as np
 
 from ..nav.mapper import PATCH_M, Mapper, TouchMap
 from ..nav.mapping import textures_in
+from ..nav.observations import observed
 from ..observation import Row, has_normals
 from ..pilot.choices import Choices
 from ..pilot.states import CLEAR_M, EXPLORE_M_S, TURN_RAD_S
 from ..planning.coverage import Vehicle
 from ..planning.mapping import Mapping
 from ..scene import Arena, Robot, Scene
-from .observed import observed
 
 RANDOM, MAP = "random", "map"
 VEHICLE = Vehicle(EXPLORE_M_S, TURN_RAD_S, CLEAR_M / EXPLORE_M_S, 0.25)

@@ -9,7 +9,7 @@ import numpy as np
 from ..nav import localise
 from ..outputs import opened
 from ..scene import Scene
-from .network.rows import Step, time_text
+from .network.rows import Step
 
 FILES = (("est", localise.ESTIMATE_HEADER), ("covariance", "t_s,xx_m2,xy_m2,yy_m2"))
 
@@ -44,7 +44,7 @@ class Track:
         for row in step.lead():
             self.filter.step(row)
         row = step.last()
-        t_s, estimate = time_text(row), self.filter.step(row)
+        t_s, estimate = row.t_text, self.filter.step(row)
         if self._poses:
             c = estimate.covariance
             print(estimate.line(t_s), file=self._poses, flush=True)

@@ -63,7 +63,7 @@ def test_filters_never_read_the_truth_and_earlier_rows_never_know_later_ones(fol
 def test_bad_cells_are_counted_and_the_run_goes_on(capsys, folder):
     path = folder / "observations.csv"
     bad = [("odo_x_m", "inf"), ("odo_y_m", ""), ("floorL_VINYL", "nan"), ("floorR_ROUGH", "what")]
-    bad += [("w0_mm", "-5"), ("w1_mm", "what"), ("w2_mm", "inf"), ("w3_mm", "9999"), ("t_s", "soon")]
+    bad += [("w0_mm", "-5"), ("w1_mm", "what"), ("w2_mm", "-inf"), ("w3_mm", "9999"), ("t_s", "soon")]
     for row, (column, text) in enumerate(bad, start=3):
         replace_cell(path, row, column, text)
     replace_cell(path, 20, "w0_mm", "nan")  # not read: no mistake

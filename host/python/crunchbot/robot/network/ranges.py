@@ -8,8 +8,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-# What intake.c of host/nav/measurement takes in one row: the Create drives at most 0.5 m/s, and a row may carry a whisk.
-ROW_MOST_M, ROW_MOST_RAD = 1.0, math.pi
+from ...nav.faults import ROW_MOST_M, ROW_MOST_RAD
+
 FAR_M = 1e5  # of any place, sums of the odometry included
 TURNED_RAD = 1e7  # of any angle that is summed: half a year of turning
 ROWS_MOST = 2**31  # of a stream: almost seven years

@@ -4,15 +4,13 @@ import math
 
 import numpy as np
 
+from ...nav.faults import MOST_M_S, MOST_RAD_S, SLACK_M, SLACK_RAD
 from ...observation import NORMAL, Quantity, normal, parse
 from ...scene import Scene
 from .inbox import Received
 from .messages import REMEDIES, Observation
 from .rows import ROW_NS, between, leaps
 
-# A Create's wheels turn at 0.5 m/s at most, 235 mm apart. The slack is for reports that come a little late.
-MOST_M_S, MOST_RAD_S = 0.5, 4.3
-SLACK_M, SLACK_RAD = 0.05, 0.1
 ROUNDING = 1e-6  # m and rad, between a row's motion and the sums on both sides
 
 

@@ -76,11 +76,6 @@ def to_row(message: Observation, motion: ArrayLike | None = None, t_ns: int | No
     return Row(message.kind, round(stamp / 1e9, 9), np.asarray(motion), tuple(message.names), cells, numbers)
 
 
-def time_text(row: Row) -> str:
-    """A row's time as the files hold it."""
-    return f"{row.t_s:.10g}"
-
-
 @dataclass(frozen=True)
 class Step:
     """What a filter takes: a row, and the motion since the row of the step before."""
