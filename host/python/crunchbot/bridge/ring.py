@@ -1,11 +1,13 @@
 """The shared ring of frames as NumPy views, read where the frames lie (host/libwhisker/include/whisker/ring.h)."""
 
+import math
 import pwd
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +33,7 @@ assert FRAME.itemsize == ffi.sizeof("struct whisker_frame")
 FRAMES = ffi.typeof("struct whisker_frame[]")
 CAPACITY: int = lib.WHISKER_RING_FRAMES
 NODES_BYTES = 1 << 16  # more than whiskerd writes
+COMING = ("RING_MISSING", "WRITER_DEAD")  # of a ring that may come up
 STOP_S = 0.2  # how soon the wish to stop is noticed while a ring is waited for
 
 
@@ -64,6 +67,24 @@ def user_name(user: int) -> str:
 def milliseconds(seconds: float | None) -> int:
     """The library's timeout: None waits for ever."""
     return -1 if seconds is None else int(1000 * seconds)
+
+
+def _in_pieces(
+    call: Callable[[int], int],
+    wait_s: float | None,
+    going_on: tuple[str, ...],
+    stop: threading.Event | None = None,
+) -> int:
+    """The error of a call of the library that waits, in pieces: between them signals are heard, and `stop`. going_on: the
+    errors that are no end."""
+    until = math.inf if wait_s is None else time.monotonic() + wait_s
+    while True:
+        left_s = max(0.0, until - time.monotonic())
+        error = call(milliseconds(min(left_s, STOP_S)))
+        if not error or left_s <= STOP_S or (stop and stop.is_set()):
+            return error
+        if ffi.string(lib.whisker_error_name(error)).decode() not in going_on:
+            return error
 
 
 @dataclass(frozen=True)
@@ -186,8 +207,14 @@ def error_line(error: int) -> str:
 class Reader:
     """One reader of one ring. Use as a context manager, by one thread at a time."""
 
-    def __init__(self, name: str, wait_s: float | None = 0.0, owner: int | None = None):
-        """Attach at the ring's oldest frame, waiting so long for the ring to come up (None: for ever).
+    def __init__(
+        self,
+        name: str,
+        wait_s: float | None = 0.0,
+        owner: int | None = None,
+        stop: threading.Event | None = None,
+    ):
+        """Attach at the ring's oldest frame, waiting so long for the ring to come up (None: for ever), or until `stop` is set.
 
         A ring of root, of this user, of the service's user, or of the user with the id `owner` is read. Another user's is
         refused: RingError RING_OWNER.
@@ -195,8 +222,8 @@ class Reader:
         self.name = name
         handle = ffi.new("struct whisker_reader **")
         accepted = lib.WHISKER_RING_NO_OWNER if owner is None else owner
-        error = lib.whisker_reader_attach_owned(name.encode(), accepted, milliseconds(wait_s), handle)
-        check(error, name)
+        attach = partial(lib.whisker_reader_attach_owned, name.encode(), accepted)
+        check(_in_pieces(lambda wait_ms: attach(wait_ms, handle), wait_s, COMING, stop), name)
         self._reader = ffi.gc(handle[0], lib.whisker_reader_detach)
         self._view, self._count = ffi.new("const struct whisker_frame **"), ffi.new("size_t *")
         self._attached()
@@ -236,7 +263,7 @@ class Reader:
 
     def wait(self, wait_s: float | None = 10.0) -> None:
         """Return when there is a frame to peek. RingError TIMEOUT; when all is read, CLOSED, WRITER_DEAD, RESTARTED."""
-        check(lib.whisker_reader_wait(self._reader, milliseconds(wait_s)), self.name)
+        check(_in_pieces(partial(lib.whisker_reader_wait, self._reader), wait_s, ("TIMEOUT",)), self.name)
 
     def peek(self) -> np.ndarray:
         """All frames published and not yet left behind, oldest first: a read-only view into the ring, maybe empty.
@@ -280,9 +307,9 @@ class Reader:
         """Go to where at most the newest `count` frames are still to be read. Never goes back."""
         lib.whisker_reader_seek_latest(self._reader, count)
 
-    def reattach(self, wait_s: float | None = 0.0) -> None:
-        """Attach to the new ring of this name after WRITER_DEAD or RESTARTED; counters stay."""
-        check(lib.whisker_reader_reattach(self._reader, milliseconds(wait_s)), self.name)
+    def reattach(self, wait_s: float | None = 0.0, stop: threading.Event | None = None) -> None:
+        """Attach to the new ring of this name after WRITER_DEAD or RESTARTED; counters stay. `stop`: as for a new reader."""
+        check(_in_pieces(partial(lib.whisker_reader_reattach, self._reader), wait_s, COMING, stop), self.name)
         self._attached()
 
     @property
@@ -316,14 +343,7 @@ class Reader:
 
 def await_reader(name: str, wait_s: float, stop: threading.Event, owner: int | None = None) -> Reader:
     """A Reader of a ring that is waited for until `wait_s` are over or `stop` is set; RingError says why there is none."""
-    until = time.monotonic() + wait_s
-    while True:
-        left_s = max(0.0, until - time.monotonic())
-        try:
-            return Reader(name, min(left_s, STOP_S), owner)
-        except RingError as error:
-            if error.name not in ("RING_MISSING", "WRITER_DEAD") or left_s <= STOP_S or stop.is_set():
-                raise
+    return Reader(name, wait_s, owner, stop)
 
 
 class Writer:

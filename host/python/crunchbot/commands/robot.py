@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
                 print(f"bag: {files['bag']}" + (f"; map: {files['map']}" if arguments.map else ""), flush=True)
             page = logs / "view.log" if arguments.desktop and not arguments.no_view else None
             Terminal(arguments.ring, page, arguments.pace, stop, _tell).start()
-            ended = Supervisor(table, logs, link, until).run(stop)
+            ended = Supervisor(table, logs, link, until, _tell).run(stop)
     print(f"all ended: {ended}")
     return 0
 

@@ -66,7 +66,7 @@ class Recorder:
             except RingError as error:
                 if error.name == "CLOSED":
                     return
-                self._interrupted(error, patience_s)
+                self._interrupted(error, patience_s, stop)
                 continue
             self.step(False, frames)
             stop.wait(self._gather_s)
@@ -142,12 +142,12 @@ class Recorder:
                 self.tally.missing += missing
                 self._writer.event(time_ns, MISSING, tick=int(ticks[index]), frames=missing)
 
-    def _interrupted(self, error: RingError, patience_s: float) -> None:
+    def _interrupted(self, error: RingError, patience_s: float, stop: threading.Event) -> None:
         if error.name == "TIMEOUT":
             self._report_second()
         elif error.name in ("WRITER_DEAD", "RESTARTED"):
             self._writer.flush()
-            self._reader.reattach(patience_s)
+            self._reader.reattach(patience_s, stop)
             self._overrun = self._reader.info.frames_overrun
             self._reattached = True
         else:

@@ -1,5 +1,6 @@
 """What `whisker robot` says in the terminal while it runs: where its page is, what share of its samples is lost, its pace."""
 
+import contextlib
 import re
 import threading
 import time
@@ -28,9 +29,10 @@ class Terminal(threading.Thread):
             self.look()
 
     def look(self) -> None:
-        if self._page and self._page.exists() and (found := re.search(r"http://\S+", self._page.read_text())):
-            self._tell(f"the robot's page: {found[0]}")
-            self._page = None
+        with contextlib.suppress(OSError):  # not there yet, or no disk
+            if self._page and (found := re.search(r"http://\S+", self._page.read_text(errors="replace"))):
+                self._tell(f"the robot's page: {found[0]}")
+                self._page = None
         try:
             self._look_at_ring()
         except RingError as error:

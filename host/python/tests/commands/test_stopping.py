@@ -7,8 +7,9 @@ import threading
 
 import pytest
 from patience import PATIENCE_S
+from rings import ring_name
 
-from crunchbot.bridge.ring import RingError, await_reader
+from crunchbot.bridge.ring import Reader, RingError, Writer, await_reader
 
 TWICE = """
 import signal
@@ -77,3 +78,24 @@ def test_a_ring_is_not_waited_for_when_it_is_to_stop():
     stop.set()
     with pytest.raises(RingError):
         await_reader("whisker-test-no-such-ring", 1e6, stop)
+
+
+def test_a_wait_for_a_ring_without_an_end_hears_signals_and_the_wish_to_stop():
+    """The library waits in C: in one piece it would hear neither."""
+    stop = threading.Event()
+    threading.Timer(0.3, stop.set).start()
+    with pytest.raises(RingError, match="there is no ring"):
+        Reader("whisker-test-nosuch", None, stop=stop)
+    name = ring_name()
+    with Writer(name) as ring, Reader(name) as reader:
+        for call in (lambda: Reader("whisker-test-nosuch", None), lambda: reader.wait(None)):
+            before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+            signal.setitimer(signal.ITIMER_REAL, 0.3)
+            with pytest.raises(KeyboardInterrupt):
+                call()
+            signal.signal(signal.SIGALRM, before)
+        ring.close()
+        threading.Timer(0.3, stop.set).start()
+        stop.clear()
+        with pytest.raises(RingError):
+            reader.reattach(None, stop)

@@ -12,6 +12,7 @@ import time
 from dataclasses import replace
 from types import SimpleNamespace
 
+import injector
 import pytest
 from linkkit import free_endpoint
 from patience import PATIENCE_S
@@ -301,3 +302,111 @@ def test_the_end_of_the_one_that_all_need_is_the_end_of_all(tmp_path):
     assert Supervisor([ends, STAYS], tmp_path, until="bridge").run(threading.Event()) == "bridge ended (exit code 0)"
     with pytest.raises(RunError, match="fails failed"):
         Supervisor([FAILS, STAYS], tmp_path, until="fails").run(threading.Event())
+
+
+def test_what_never_ran_says_so_once_after_the_third_try(tmp_path):
+    lines: list[str] = []
+    kept = Kept(FAILS, tmp_path)
+    kept.keeper._tell = lines.append
+    for number in range(1, 6):
+        kept.start()
+        kept.end()
+        kept.clock.now += kept.keeper.wait_s()
+        assert len(lines) == (number >= 3)
+    log = tmp_path / "fails.log"
+    assert lines == [f"fails failed (exit code 3): no such arena; log: {log}; it has never run, and is tried again"]
+    steady = Kept(replace(STAYS, steady_s=0.0), tmp_path)
+    steady.keeper._tell = lines.append
+    for _ in range(4):
+        steady.start()
+        os.killpg(steady.keeper.pid, signal.SIGKILL)
+        steady.end()
+    assert len(lines) == 1
+
+
+FAULTS = """
+import errno, os, resource, sys, threading, time
+from pathlib import Path
+import injector
+from crunchbot.robot.processes.children import Program
+from crunchbot.robot.processes.supervisor import Keeper
+
+place = Path(sys.argv[1])
+RUNS = 3
+
+
+def life(logs: Path, ran: Path, tight: bool) -> int:
+    \"\"\"A program that fails, RUNS times. How often it could be started. tight: no descriptor is left while it ends.\"\"\"
+    ended, now, started = threading.Event(), [0.0], 0
+    program = Program("fails", ("sh", "-c", f"echo >>{ran}; echo it fails >&2; exit 1"), moves=True, fed=True)
+    keeper = Keeper(program, logs, ended.set, lambda: now[0])
+    for _ in range(RUNS):
+        ended.clear()
+        now[0] += 10.0
+        keeper.step()
+        if keeper._child:
+            started += 1
+            ended.wait()
+            limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+            if tight:
+                resource.setrlimit(resource.RLIMIT_NOFILE, (3, limits[1]))
+            while not keeper.settled():
+                time.sleep(0.001)
+            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+    assert keeper.restarts == RUNS and keeper.last_error.startswith("fails "), keeper.last_error
+    keeper.close()
+    return started
+
+
+def tried(name: str, prepare, tight: bool = False) -> tuple[int, int, int]:
+    \"\"\"In a process of its own: (how often it was started, 99: something was raised; how often it ran; operations).\"\"\"
+    folder = place / name
+    folder.mkdir()
+    reading, writing = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        try:
+            prepare(folder / "logs")
+            code = life(folder / "logs", folder / "ran", tight)
+        except BaseException as error:
+            print(name, repr(error), file=sys.stderr)
+            code = 99
+        os.write(writing, str(injector.counted()).encode())
+        os._exit(code)
+    os.close(writing)
+    with open(reading) as pipe:
+        count = int(pipe.read())
+    code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    return code, len((folder / "ran").read_text().splitlines()) if (folder / "ran").exists() else 0, count
+
+
+code, ran, operations = tried("whole", injector.arm)
+assert (code, ran) == (RUNS, RUNS) and operations > 3 * RUNS, (code, ran, operations)
+assert tried("tight", lambda logs: None, True)[:2] == (RUNS, RUNS)
+ends = 1
+for error in (errno.ENOSPC, errno.EIO, errno.EMFILE):
+    for lasts in (False, True):
+        for at in range(1, operations + 1):
+            name = f"{errno.errorcode[error]}-{lasts}-{at}"
+            code, ran, _ = tried(name, lambda logs: injector.arm(logs, at, error, lasts))
+            assert (code, ran) == (RUNS, RUNS), (name, code, ran)
+            ends += 1
+held = len(os.listdir("/proc/self/fd"))
+for more in range(30):
+    limit = lambda logs: resource.setrlimit(resource.RLIMIT_NOFILE, (held + more, held + more))
+    code, ran, _ = tried(f"descriptors-{more}", limit)
+    assert code == ran <= RUNS, (more, code, ran)
+    ends += 1
+assert code == RUNS
+print(operations, ends)
+"""
+
+
+def test_no_file_operation_of_a_supervisor_decides_over_its_processes(tmp_path):
+    """Each fails in turn, once and from then on: no room, broken, no descriptor. All that is kept is what was said."""
+    library = injector.build(tmp_path)
+    environment = injector.environment(library) | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    (tmp_path / "tries").mkdir()
+    words = [sys.executable, "-c", FAULTS, tmp_path / "tries"]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

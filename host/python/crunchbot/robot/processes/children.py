@@ -19,7 +19,7 @@ from typing import Any
 
 from ...stamping import VARIABLE as TIMES
 from .lifeline import VARIABLE, Lifeline, Pulse
-from .logs import last_line, note
+from .logs import Log, last_line
 from .watchdog import VARIABLES, Watchdog
 
 GRACE_S = 10.0  # for a child to end after SIGTERM, before SIGKILL
@@ -63,24 +63,29 @@ class Child:
     ):
         """`log` is written on if it exists; `on_end` is called once, from a thread, when the process has ended.
 
-        OSError when it cannot be started; nothing stays open then.
+        OSError or RuntimeError (no thread) when it cannot be started; nothing stays open, and nothing runs, then.
         """
         self.program, self.name, self.log, self._on_end = program, program.name, log, on_end
         with ExitStack() as opened:
-            log.parent.mkdir(parents=True, exist_ok=True)
-            self._log = opened.enter_context(log.open("a"))
+            self._log = opened.enter_context(closing(Log(log)))
             self._lifeline = opened.enter_context(closing(Lifeline()))
             self._pulse = opened.enter_context(closing(Pulse())) if program.moves else None
             self._watchdog = opened.enter_context(closing(Watchdog())) if program.fed else None
             self.process = self._start(subprocess.PIPE if on_line else self._log)
+            self.started_s = time.monotonic()
+            self.ended_s: float | None = None
+            self._threads = [threading.Thread(target=self._watch, daemon=True)]
+            if on_line:
+                self._threads.append(threading.Thread(target=self._read, args=(on_line,), daemon=True))
+            try:
+                self._tie()
+                for thread in self._threads:
+                    thread.start()
+            except BaseException:
+                self.kill()  # nobody would answer for it
+                self.process.wait()
+                raise
             self._opened = opened.pop_all()
-        self.started_s = time.monotonic()
-        self.ended_s: float | None = None
-        self._threads = [threading.Thread(target=self._watch, daemon=True)]
-        if on_line:
-            self._threads.append(threading.Thread(target=self._read, args=(on_line,), daemon=True))
-        for thread in self._threads:
-            thread.start()
 
     def _start(self, stderr) -> subprocess.Popen:
         ties = [tie for tie in (self._pulse, self._watchdog) if tie]
@@ -88,7 +93,7 @@ class Child:
         for tie in ties:
             environment |= tie.variables
         pipes = [pipe.reading for pipe in (self._lifeline, self._pulse) if pipe]
-        process = subprocess.Popen(
+        return subprocess.Popen(
             self.program.command,
             stdin=subprocess.DEVNULL,
             stdout=self._log,
@@ -99,11 +104,12 @@ class Child:
             pass_fds=pipes,
             env=environment,
         )
-        self._lifeline.tie(process.pid, self.program.orphaned)
-        note(self._log, f"started as process {process.pid}")
+
+    def _tie(self) -> None:
+        self._lifeline.tie(self.process.pid, self.program.orphaned)
+        self._log.note(f"started as process {self.process.pid}")
         if self._pulse:
             self._pulse.started()
-        return process
 
     def _watch(self) -> None:
         self.process.wait()
@@ -144,7 +150,6 @@ class Child:
     def failure(self) -> str:
         """One line about a bad end."""
         self._join()
-        self._log.flush()
         line = last_line(self.log)
         said = f": {line}" if line else ""
         return f"{self.name} failed ({self.how()}){said}; log: {self.log}"
@@ -168,9 +173,13 @@ class Child:
                     self.process.wait(timeout=GRACE_S)
         self.kill()  # grandchildren of one that died
         self._join()
-        with contextlib.suppress(OSError):  # a full disk
-            note(self._log, f"ended ({self.how()})")
+        self._log.note(f"ended ({self.how()})")
         self._opened.close()
+
+    @property
+    def unwritten(self) -> int:
+        """How often its log could not be written."""
+        return self._log.unwritten
 
     def _join(self) -> None:
         for thread in self._threads:
@@ -187,12 +196,20 @@ class Child:
 def living(group: int) -> dict[int, str]:
     """The living processes of a process group: their states as of proc(5), by pid."""
     found = {}
-    for stat in Path("/proc").glob("[0-9]*/stat"):
+    for stat in _processes():
         with contextlib.suppress(OSError):
             state, _, number = stat.read_text(errors="replace").rpartition(")")[2].split()[:3]
             if int(number) == group and state not in DEAD:
                 found[int(stat.parent.name)] = state
     return found
+
+
+def _processes() -> list[Path]:
+    """None where the list cannot be read, as when no descriptor is left: what is not known to be there is not waited for."""
+    try:
+        return list(Path("/proc").glob("[0-9]*/stat"))
+    except OSError:
+        return []
 
 
 def _how(code: int) -> str:

@@ -1,11 +1,11 @@
 """Logs of processes that another one starts: a folder for each run, notes of start and end, the last line of a log."""
 
+import contextlib
 import os
 import re
 import time
 from itertools import count
 from pathlib import Path
-from typing import TextIO
 
 from ...outputs import unwritable
 from ...stamping import stamp
@@ -62,7 +62,33 @@ def last_line(log: Path) -> str:
     return next((line for line in reversed(lines) if line and not line.startswith(("progress ", OURS))), "")
 
 
-def note(log: TextIO, text: str) -> None:
-    """A line of ours in a process's log."""
-    log.write(f"{stamp()}{OURS}{text}\n")
-    log.flush()
+class Log:
+    """A process's log, written on if it is there, without a buffer. What is said about a process decides nothing over it: what
+    cannot be opened or written is counted in `unwritten`. OSError when not even /dev/null can be opened."""
+
+    def __init__(self, path: Path):
+        self.unwritten = 0
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        except OSError:
+            self.unwritten += 1
+            self._file = os.open(os.devnull, os.O_WRONLY | os.O_CLOEXEC)
+
+    def fileno(self) -> int:
+        """For the process's own output."""
+        return self._file
+
+    def write(self, text: str) -> None:
+        try:
+            os.write(self._file, text.encode(errors="replace"))
+        except OSError:
+            self.unwritten += 1
+
+    def note(self, text: str) -> None:
+        """A line of ours."""
+        self.write(f"{stamp()}{OURS}{text}\n")
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):  # of an earlier write, as on a network's disk
+            os.close(self._file)

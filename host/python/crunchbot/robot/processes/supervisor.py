@@ -14,6 +14,7 @@ from contextlib import closing
 from pathlib import Path
 
 from ...errors import UserError
+from ...tables import ignore
 from ..network.health import ENDED, RUNNING
 from ..network.link import Link
 from ..network.messages import HEALTH, Header, KeyValue, ProcessHealth
@@ -25,6 +26,7 @@ LEAVE_S = 0.2  # for what a program has left behind to end by itself: a driver s
 KILLED_S = 1.0  # for the kernel to end what was killed
 LOOK_S, LEAVE_LOOK_S = 0.05, 0.01
 TELL_S = 1.0
+TRIES = 3  # of what has never run, before a person is warned: the first may be for a part that comes up meanwhile
 
 
 class RunError(UserError):
@@ -37,13 +39,19 @@ class Keeper:
     """One line of the table: its child, and when it is started again."""
 
     def __init__(
-        self, program: Program, logs: Path, on_end: Callable[[], None], clock: Callable[[], float] = time.monotonic
+        self,
+        program: Program,
+        logs: Path,
+        on_end: Callable[[], None],
+        clock: Callable[[], float] = time.monotonic,
+        tell: Callable[[str], None] = ignore,
     ):
         self.program, self.restarts, self.last_error = program, 0, ""
         self.refused = self.failed = False  # it ended with exit code 2 and never ran steadily; its last run failed
         self._log, self._on_end, self._clock = logs / f"{program.name}.log", on_end, clock
         self._child: Child | None = None
         self._pause_s, self._due_s, self._steady = PAUSE_S, clock(), False
+        self._tell, self._tries, self.unwritten = tell, 0, 0  # log lines
 
     @property
     def pid(self) -> int:
@@ -96,8 +104,8 @@ class Keeper:
     def _start(self, now: float) -> None:
         try:
             self._child = Child(self.program, self._log, on_end=self._on_end)
-        except OSError as error:
-            self.last_error = f"{self.program.name} cannot be started ({error.strerror or error})"
+        except (OSError, RuntimeError) as error:
+            self.last_error = f"{self.program.name} cannot be started ({getattr(error, 'strerror', None) or error})"
             self._put_off(now, steady=False)
 
     def _note_end(self, child: Child, now: float) -> None:
@@ -105,6 +113,7 @@ class Keeper:
         with closing(child):
             self.failed = child.failed
             self.last_error = child.failure() if child.failed else f"{child.name} ended ({child.how()})"
+        self.unwritten += child.unwritten
         steady = child.ended_s - child.started_s >= self.program.steady_s
         self._steady |= steady
         self.refused = child.process.returncode == UserError.exit_code and not self._steady
@@ -117,6 +126,9 @@ class Keeper:
         else:
             self._due_s, self._pause_s = now + self._pause_s, min(PAUSE_MOST_S, 2.0 * self._pause_s)
         self.restarts += 1
+        self._tries += 1
+        if self._tries == TRIES and not self._steady:
+            self._tell(f"{self.last_error}; it has never run, and is tried again")
 
     def ask_to_end(self) -> None:
         """It will end soon."""
@@ -133,9 +145,17 @@ class Keeper:
 class Supervisor:
     """`run` until stopped, or until the program `until` has ended. The table's first are started first and ended last."""
 
-    def __init__(self, table: list[Program], logs: Path, link: Link | None = None, until: str | None = None):
+    def __init__(
+        self,
+        table: list[Program],
+        logs: Path,
+        link: Link | None = None,
+        until: str | None = None,
+        tell: Callable[[str], None] = ignore,
+    ):
+        """tell: for what a person at the terminal has to know."""
         self._woken, self._until, self._link = threading.Event(), until, link
-        self._keepers = [Keeper(program, logs, self._woken.set) for program in table]
+        self._keepers = [Keeper(program, logs, self._woken.set, tell=tell) for program in table]
         self._streams = {k.program.name: link.publish(f"{HEALTH}/{k.program.name}") for k in self._reported()}
         self._began_s, self._report_s, self._beat_s = time.monotonic(), 0.0, 0.0
 
@@ -202,7 +222,8 @@ class Supervisor:
 
     def _report_of(self, keeper: Keeper, state: str) -> None:
         header = Header.at(round((time.monotonic() - self._began_s) * 1e9))
-        name, counters = keeper.program.name, [KeyValue("restarts", str(keeper.restarts))]
+        counted = {"restarts": keeper.restarts, "log_unwritten": keeper.unwritten}
+        name, counters = keeper.program.name, [KeyValue(name, str(count)) for name, count in counted.items()]
         self._streams[name].send(ProcessHealth(header, name, keeper.pid, state, counters, keeper.last_error))
 
     def _close(self) -> None:
