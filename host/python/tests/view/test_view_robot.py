@@ -282,6 +282,11 @@ def test_a_page_is_reported_of_unknown_ground_and_not_of_tables():
     [
         (True, {"x": 0.3, "y": 2, "theta": -1.5}, ""),
         (True, {"x": 2.6, "y": 2, "theta": 0}, "set_pose: (2.6, 2) is outside the arena"),
+        (
+            True,
+            {"x": 0.75, "y": 1.75, "theta": 0},
+            "set_pose: (0.75, 1.75) is in an obstacle; give a place that is free",
+        ),
         (True, {"x": "1", "y": 2, "theta": 0}, "set_pose: field 'x' must be a number from -3000 to 3000, not '1'"),
         (True, {"x": True, "y": 2, "theta": 0}, "set_pose: field 'x' must be a number"),
         (True, {"x": 1, "y": 2}, "set_pose: field 'theta' is missing"),

@@ -182,6 +182,10 @@ def test_foxglove_gets_every_topic_and_sets_the_pose(tmp_path):
         }
     ).encode()
 
+    lying = as_json.replace(b'"w": 1', b'"w": 0')
+    walled = as_json.replace(b'"x": 1.5, "y": 0.5', b'"x": 0.6, "y": 0.3')
+    assert as_json not in (lying, walled)
+
     async def watch(port: int, streams: dict) -> None:
         async with connect(f"ws://127.0.0.1:{port}", subprotocols=["foxglove.sdk.v1"], max_size=None) as socket:
             client, seen, stamp = FoxgloveClient(socket), {}, ROW_NS
@@ -197,12 +201,14 @@ def test_foxglove_gets_every_topic_and_sets_the_pose(tmp_path):
                 if topic in seen:
                     assert seen[topic][0] == kind.replace("/", "/msg/") and types.decode(kind, seen[topic][1])
             for number, (encoding, data) in enumerate(
-                (("cdr", cdr), ("json", as_json), ("json", b"{}"), ("cdr", b"?")), 1
+                (("cdr", cdr), ("json", as_json), ("json", b"{}"), ("cdr", b"?"), ("json", lying), ("json", walled)), 1
             ):
                 await client.advertise(number, encoding)
                 await client.publish(number, data)
-            while len(client.statuses) < 2:
+            while len(client.statuses) < 4:
                 await client.next()
+            assert "/initialpose: orientation (0, 0, 0, 0) has no heading; give z = sin" in str(client.statuses[2])
+            assert "/initialpose: (0.6, 0.3) is in an obstacle; give a place that is free" in str(client.statuses[3])
 
     with Link("pilot", listen=[endpoint]) as link, server(tmp_path / "scene", endpoint) as port:
         inbox = link.subscribe("initial_pose")
