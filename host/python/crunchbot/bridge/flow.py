@@ -37,8 +37,8 @@ class Flow:
         self._seen.append((now, np.array([frames, missing, dropped], np.int64)))
 
     def rate(self) -> float:
-        """Frames per second of the wall clock; 0 before the second look."""
-        elapsed_s = self._clock() - self._seen[0][0] if self._seen else 0.0
+        """Frames per second of the wall clock, to the last look; 0 before the second one."""
+        elapsed_s = self._seen[-1][0] - self._seen[0][0] if self._seen else 0.0
         return float(self._grown()[0]) / elapsed_s if elapsed_s > 0 else 0.0
 
     def loss(self) -> tuple[float, str, str] | None:
