@@ -40,7 +40,7 @@ WITH_BRIDGE = {
     "whisker info": '"wire_version": ',
     "whisker top": FOREVER,
     "whisker view": FOREVER,
-    "whisker doctor": "frames in 0.5 s",
+    "whisker doctor": " frames in ",
     "whisker calibrate": "rest (",
     "whisker bridge-sim": "is up; try: whisker top",
     "whisker record": "drive.mcap: 4000 frames",

@@ -61,7 +61,7 @@ WITH_BRIDGE = {
     "whisker info": "wire_version: ",
     "whisker info --nodes": "lane",
     "whisker calibrate --out calibration --scene scenes/mine": "rest (",
-    "whisker doctor": "frames in 0.5 s",
+    "whisker doctor": " frames in ",
     "whisker top --scene scenes/mine --once": "lane",
     "whisker stream --lanes 0,1 --frames 16000": "",
     "whisker record drive.mcap --seconds 60": "frames",
