@@ -19,6 +19,9 @@ from .observations import Observations, observed
 FAVOURITE, SPARE = "adaptive", "grid"
 SENSOR_UNKNOWN = 255
 SEED_MOST = 2**64 - 1
+HEARD = (
+    10  # rows of a call of the library, between which signals are heard: a second's, and a filter keeps pace with them
+)
 COMPONENTS_MOST = int(lib.NAV_COMPONENTS_MOST)  # of a belief to begin from
 
 # struct nav_estimate and struct nav_component
@@ -191,7 +194,9 @@ class Filter:
         table, step_us = np.zeros(count, ESTIMATE), np.zeros(count)
         packed, keep = pack(rows, (self._tips, self._classes), self._rays, self._own)
         out = pointer(ESTIMATES, ESTIMATE, table, "table", (count,))
-        lib.nav_replay(self._filter, packed, first, count, out, doubles(step_us, "step_us", (count,)))
+        took = doubles(step_us, "step_us", (count,))
+        for at in range(0, count, HEARD):
+            lib.nav_replay(self._filter, packed, first + at, min(HEARD, count - at), out + at, took + at)
         del keep  # until here
         table["pose"] = to_map(table["pose"], self.scene.origin)
         table["covariance"] = spread_on_map(table["covariance"], self.scene.origin)

@@ -5,11 +5,16 @@ import subprocess
 import sys
 import threading
 
+import level0
+import numpy as np
 import pytest
 from patience import PATIENCE_S
 from rings import ring_name
 
 from crunchbot.bridge.ring import Reader, RingError, Writer, await_reader
+from crunchbot.native import lib
+from crunchbot.nav import filters
+from crunchbot.nav.filters import Filter
 
 TWICE = """
 import signal
@@ -99,3 +104,24 @@ def test_a_wait_for_a_ring_without_an_end_hears_signals_and_the_wish_to_stop():
         stop.clear()
         with pytest.raises(RingError):
             reader.reattach(None, stop)
+
+
+def test_a_filter_hears_signals_between_rows(monkeypatch):
+    """A call of the library hears none: it is given few rows, and all of them in their order."""
+    scene, observations = level0.record(3, rows=47)
+    calls = []
+
+    class Library:
+        def __getattr__(self, name):
+            return getattr(lib, name)
+
+        def nav_replay(self, made, rows, first, count, *out):
+            calls.append((first, count))
+            lib.nav_replay(made, rows, first, count, *out)
+
+    monkeypatch.setattr(filters, "lib", Library())
+    table, step_us = Filter("grid", scene).replay(observations, 3, 44)
+    assert calls == [(first, min(10, 47 - first)) for first in range(3, 47, 10)]
+    monkeypatch.setattr(filters, "HEARD", 100)
+    whole, _ = Filter("grid", scene).replay(observations, 3, 44)
+    assert np.array_equal(table, whole) and (step_us > 0).all()
