@@ -92,9 +92,9 @@ def other_map(room, folder: Path, *origin: float) -> Path:
 
 
 def test_a_map_that_is_turned_changes_nothing_but_the_frame(room, capsys, tmp_path):
-    """The same rows on the same image, once with the image's corner as the map's origin."""
+    """The same rows on the same image, once seen from the corner of the image."""
     flat = tmp_path / "flat"
-    scene = scene_folder.load(room.folder, other_map(room, tmp_path, 0.0, 0.0, 0.0))
+    scene = scene_folder.load(room.folder, room.map)
     start = tuple(from_map(np.array([scene.prior.mean]), ORIGIN)[0].tolist())
     rows = localise.read_observations(room.folder / "observations.csv", scene)
     rows.truth = from_map(rows.truth, ORIGIN)
