@@ -47,6 +47,7 @@ class Build:
     high speed, so there is no other speed to describe (USB 2.0 section 9.6.2); usb_id: vendor and product.
     """
 
+    product: str = "Whisker bridge"
     serial: str = "0001"
     board: int = BOARDS["simulation"]
     commit: int = 0
@@ -147,7 +148,7 @@ def descriptors(build: Build) -> DeviceDescriptorCollection:
         device.idVendor, device.idProduct = build.usb_id
         device.bcdDevice = LIMITS["gateware_version"]
         device.iManufacturer = "CrunchBot"
-        device.iProduct = "Whisker bridge"
+        device.iProduct = build.product
         device.iSerialNumber = build.serial
         device.bNumConfigurations = 1
     collection.add_descriptor(configuration(build, True), descriptor_type=CONFIGURATION_AT_FULL_SPEED)

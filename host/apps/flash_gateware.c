@@ -5,6 +5,7 @@
 
 #include "cli.h"
 #include "whisker/whisker.h"
+#include "whisker_protocol.h"
 
 #define PROGRAM "whisker-flash"
 #define BAR_WIDTH 40
@@ -56,4 +57,21 @@ int flash_gateware(const char *path, const uint8_t *bytes, uint32_t count, const
     }
     whisker_device_close(device);
     return error ? cli_fail(PROGRAM, path, error) : CLI_OK;
+}
+
+int flash_boot_drive(const char *bridge)
+{
+    struct whisker_device *device = NULL;
+    struct whisker_identity identity;
+    int error = whisker_device_open(bridge, &device, &identity);
+    if (error) {
+        return cli_fail(PROGRAM, "bridge", error);
+    }
+    if (identity.board == WHISKER_BOARD_PICO) {
+        error = whisker_gateware_boot_drive(device);
+    } else {
+        fprintf(stderr, PROGRAM ": bridge: it is no Pico, so it has no boot drive; give a .whex or .wgw image\n");
+    }
+    whisker_device_close(device);
+    return error ? cli_fail(PROGRAM, "bridge", error) : identity.board == WHISKER_BOARD_PICO ? CLI_OK : CLI_FAILED;
 }

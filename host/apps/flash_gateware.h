@@ -13,4 +13,7 @@ void flash_show_progress(void *context, uint32_t done, uint32_t total);
 int flash_gateware(const char *path, const uint8_t *bytes, uint32_t count, const char *bridge, bool force,
                    bool dry_run);
 
+/* Asks the bridge of this serial number (NULL: the first) into its boot drive; a line if it has none; an exit code. */
+int flash_boot_drive(const char *bridge);
+
 #endif

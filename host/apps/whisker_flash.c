@@ -21,7 +21,7 @@
 
 struct options {
     const char *image, *bridge;
-    bool list, health, dry_run, force, has_lane, has_serial;
+    bool list, boot_drive, health, dry_run, force, has_lane, has_serial;
     uint32_t lane, serial, lane_mask;
     struct whisker_settings settings;
 };
@@ -55,6 +55,8 @@ static const struct command_option OPTIONS[] = {
      COMMAND_FLAG, AT(force), 0, 0, NULL},
     {"list", NULL, "who the nodes are", COMMAND_FLAG, AT(list), 0, 0, NULL},
     {"health", NULL, "with --list: their fault counters that are not zero", COMMAND_FLAG, AT(health), 0, 0, NULL},
+    {"boot-drive", NULL, "a Pico begins anew as a drive that takes firmware; whisker flash pico does the rest",
+     COMMAND_FLAG, AT(boot_drive), 0, 0, NULL},
     {"bridge", "TEXT", "the bridge with this serial number (the first that can be opened)", COMMAND_TEXT, AT(bridge), 0,
      0, NULL},
     {"sck-divider", "N", "as whiskerd, at most 16", COMMAND_BYTE, AT(settings.sck_divider), 0, UINT8_MAX, NULL},
@@ -67,6 +69,7 @@ static const struct command_line LINE = {
     .usage =
         "Usage: whisker-flash IMAGE [OPTION...]\n"
         "       whisker-flash --list [--health]\n"
+        "       whisker-flash --boot-drive\n"
         "Loads a firmware image (.whex) into all nodes of a bridge at once and starts it. Stop whiskerd first.\n"
         "A gateware image (.wgw) goes into the bridge itself; of the options it takes --dry-run, --force, --bridge.\n",
     .notes = "Example: whisker-flash examples/node.whex\n"
@@ -84,10 +87,11 @@ static int whisker_flash_read_options(struct options *options, int argc, char **
         return result + 1;
     }
     options->image = rest < argc ? argv[rest++] : NULL;
-    const bool wrong = rest < argc || (options->image != NULL) == options->list ||
+    const bool wrong = rest < argc || (options->image != NULL) + options->list + options->boot_drive != 1 ||
                        (options->has_lane && options->has_serial) || (options->health && !options->list);
     if (wrong) {
-        fprintf(stderr, PROGRAM ": give one image, or --list, and at most one of --lane and --node; see --help\n");
+        fprintf(stderr,
+                PROGRAM ": give one image, --list or --boot-drive, and at most one of --lane and --node; see --help\n");
     }
     return wrong ? CLI_USAGE + 1 : 0;
 }
@@ -269,6 +273,9 @@ int main(int argc, char **argv)
     int code = whisker_flash_read_options(&options, argc, argv);
     if (code != 0) {
         return cli_end(PROGRAM, code - 1);
+    }
+    if (options.boot_drive) {
+        return cli_end(PROGRAM, flash_boot_drive(options.bridge));
     }
     if (options.image && (code = whisker_flash_read_file(options.image)) != CLI_OK) {
         return code;

@@ -320,3 +320,11 @@ int whisker_gateware_update(struct whisker_device *device, const struct whisker_
     }
     return error ? error : gateware_mark(&w);
 }
+
+int whisker_gateware_boot_drive(struct whisker_device *device)
+{
+    uint8_t report[WHISKER_REPORT_FLASH_BYTES] = {WHISKER_REPORT_ID_FLASH, WHISKER_WIRE_VERSION};
+    report[WHISKER_REPORT_FLASH_COMMAND] = WHISKER_FLASH_COMMAND_BOOT;
+    const int error = device_silence(device);
+    return error ? error : device_send_flash(device, report);
+}

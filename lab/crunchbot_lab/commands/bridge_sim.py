@@ -14,7 +14,8 @@ from pathlib import Path
 
 from crunchbot.arguments import RING, number_above, whole_number
 from crunchbot.bridge.ring import Reader, RingError
-from crunchbot.programs import program
+from crunchbot.errors import UserError
+from crunchbot.programs import SOURCE_TREE, program
 from crunchbot.stopping import stop_on_signals
 from whisker_protocol import LANES, LIMITS
 
@@ -28,6 +29,9 @@ UP_S = 60.0  # for the simulated bridge to enumerate
 USBIP_PORT = 3240  # registered for USB/IP
 PORT_MAX = 65535
 LEVELS = ("rtl", "bytes")
+BOARDS = ("bridge", "pico")
+PICO_LANES, PICO_LANES_MAX = 8, 16
+PICO_SIM, PICO_IMAGE = SOURCE_TREE / "sim/pico", SOURCE_TREE / "firmware/images/pico/pico.bin"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -55,6 +59,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     port = whole_number(0, PORT_MAX)
     parser.add_argument("--usbip", nargs="?", type=port, const=USBIP_PORT, metavar="PORT", help=text)
+    text = (
+        "bridge: gateware, nodes and MLX90333; pico: the firmware of the Pico, executed, with TMAG5170s (%(default)s)"
+    )
+    parser.add_argument("--board", choices=BOARDS, default=BOARDS[0], help=text)
     parser.set_defaults(run=run)
 
 
@@ -67,7 +75,8 @@ def run(arguments: argparse.Namespace) -> int:
             watcher = threading.Thread(target=_relay, args=(process,), daemon=True)
             watcher.start()
             course = Course(Path(folder) / "sim.sock", arguments.drive, arguments.pace, over)  # it drives until the end
-            course.start()
+            if arguments.board == BOARDS[0]:
+                course.start()
             if arguments.usbip is None:
                 _await_ring(arguments.ring, process, stop)
             else:
@@ -79,13 +88,16 @@ def run(arguments: argparse.Namespace) -> int:
                 process.send_signal(signal.SIGTERM)
             process.wait()
             over.set()
-            course.join()
+            if arguments.board == BOARDS[0]:
+                course.join()
             watcher.join()
     return 0 if stopped else process.returncode
 
 
 def _command(arguments, folder: Path) -> list[str]:
     """The simulation under umockdev with whiskerd inside, or as a server."""
+    if arguments.board == "pico":
+        return _pico_command(arguments)
     text, whiskers = flat_scene(arguments.scene, arguments.seed, arguments.mechanics)
     lanes = max(arguments.lanes or whiskers, whiskers)
     (folder / "scene.flat").write_text(text)
@@ -101,6 +113,20 @@ def _command(arguments, folder: Path) -> list[str]:
         words += ["--", program("whiskerd"), "--ring", arguments.ring, "--lane-mask", mask]
     else:
         words += ["--usbip", arguments.usbip]
+    return [str(word) for word in words]
+
+
+def _pico_command(arguments) -> list[str]:
+    if not (PICO_SIM / "node_modules/rp2040js").is_dir():
+        raise UserError("bridge-sim: the emulator of the Pico is not there; run: npm ci --prefix sim/pico")
+    lanes = arguments.lanes or PICO_LANES
+    if lanes > PICO_LANES_MAX:
+        raise UserError(f"bridge-sim: --lanes {lanes}: a Pico has {PICO_LANES_MAX}; give fewer")
+    words = [program("umockdev-wrapper")] if arguments.usbip is None else []
+    words += [program("whisker-pico-sim"), *([] if arguments.usbip is None else ["--usbip", arguments.usbip])]
+    words += ["node", PICO_SIM / "serve.mjs", PICO_IMAGE, lanes, arguments.pace or 1]
+    if arguments.usbip is None:
+        words += ["--", program("whiskerd"), "--ring", arguments.ring, "--lane-mask", (1 << lanes) - 1]
     return [str(word) for word in words]
 
 

@@ -148,7 +148,7 @@ const CHECKS = {
     const bench = new Bench(image, tmags(1));
     bench.enumerate();
     const text = (index) => String.fromCharCode(...bench.request([0x80, 6, index, 3, 9, 4, 255, 0]).bytes.filter((_, i) => i >= 2 && i % 2 === 0));
-    same([text(1), text(2), text(3)], ['CrunchBot', 'Whisker bridge', 'E661385283' + '7F2B21'], 'strings');
+    same([text(1), text(2), text(3)], ['CrunchBot', 'Whisker Pico', 'E661385283' + '7F2B21'], 'strings');
     const configuration = bench.request([0x80, 6, 0, 2, 0, 0, 255, 0]).bytes;
     same([configuration.length, configuration[7], configuration[8]], [50, 0x80, 50], 'configuration');
     same(bench.request([0x80, 6, 0, 2, 0, 0, 20, 0]).bytes.length, 20, 'part of it');

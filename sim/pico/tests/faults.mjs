@@ -1,4 +1,5 @@
-// faults.mjs IMAGE COUNT SEED: faults drawn at random, each put into a run of 8 lanes; what was told of each.
+// faults.mjs IMAGE COUNT SEED: faults drawn at random, each put into a run of 8 lanes; what was told of each. A line every
+// 500 faults, the last one of all.
 import { Bench, CODE, Judge, MS, tell, tmags } from './bench.mjs';
 
 const [image, count, seed] = process.argv.slice(2);
@@ -64,5 +65,6 @@ for (let i = 0; i < +count; i++) {
   kinds[kind] = (kinds[kind] ?? 0) + 1;
   for (const j of before === judge ? [judge] : [before, judge]) { altered += j.altered + j.doubled; j.altered = j.doubled = 0; }
   if (trouble || altered || bench.host.errors.length) { wrong.push({ i, kind, trouble, altered, errors: bench.host.errors.splice(0) }); altered = 0; if (wrong.length > 20) break; }
+  if ((i + 1) % 500 === 0 && i + 1 < +count) tell({ faults: i + 1, kinds, wrong });
 }
 tell({ faults: +count, kinds, wrong });

@@ -31,7 +31,7 @@ constexpr uint32_t TO_HOST = 1;
 constexpr uint32_t ENDPOINT_LAST = 15;
 // Number of packets of a transfer that is not isochronous: the one, or, from older kernels, the other.
 constexpr uint32_t NOT_ISOCHRONOUS = UINT32_MAX;
-constexpr uint32_t SPEED_HIGH = 3;
+constexpr uint32_t SPEED_FULL = 2, SPEED_HIGH = 3;
 
 uint32_t get_u32(const Bytes &bytes, size_t at)
 {
@@ -84,7 +84,7 @@ void put_device(Bytes &bytes, const Descriptors &descriptors)
     put_text(bytes, USBIP_BUS_ID, BUS_ID_BYTES);
     put_u32(bytes, USBIP_DEVICE_ID >> 16);
     put_u32(bytes, USBIP_DEVICE_ID & UINT16_MAX);
-    put_u32(bytes, SPEED_HIGH);
+    put_u32(bytes, descriptors.high_speed() ? SPEED_HIGH : SPEED_FULL);
     put_u16(bytes, layout.vendor);
     put_u16(bytes, layout.product);
     put_u16(bytes, layout.release);

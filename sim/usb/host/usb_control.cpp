@@ -142,6 +142,18 @@ Outcome control_transfer(UsbHost &host, const SetupRequest &request, Bytes &data
     return outcome;
 }
 
+bool Descriptors::high_speed() const
+{
+    constexpr uint8_t ENDPOINT = 5;
+    constexpr size_t PACKET_HIGH = 5; // of its descriptor: the packet size's high byte; 512 only at high speed
+    for (size_t at = 0; at + PACKET_HIGH < configuration.size() && configuration[at] > 0; at += configuration[at]) {
+        if (configuration[at + 1] == ENDPOINT && configuration[at + PACKET_HIGH] >= 2) {
+            return true;
+        }
+    }
+    return false;
+}
+
 Bytes Descriptors::all() const
 {
     Bytes bytes = device;

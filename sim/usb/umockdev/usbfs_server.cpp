@@ -86,7 +86,10 @@ std::string device_record(const Descriptors &descriptors, const std::string &pat
     return "P: " + path + "\nN: bus/usb/001/" + digits + "=" + hex + "\nE: DEVNAME=" + node_of(number) +
            "\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\nE: MAJOR=189\nE: MINOR=" + std::to_string(number - 1) +
            "\nE: BUSNUM=001\nE: DEVNUM=" + digits + "\nA: busnum=1\\n\nA: devnum=" + std::to_string(number) +
-           "\\n\nA: speed=480\\n\nA: bConfigurationValue=1\\n\nA: idVendor=" + hexadecimal({device[9], device[8]}) +
+           (descriptors.product.empty() ? "" : "\\n\nA: product=" + descriptors.product) +
+           (descriptors.serial.empty() ? "" : "\\n\nA: serial=" + descriptors.serial) +
+           "\\n\nA: speed=" + (descriptors.high_speed() ? "480" : "12") +
+           "\\n\nA: bConfigurationValue=1\\n\nA: idVendor=" + hexadecimal({device[9], device[8]}) +
            "\\n\nA: idProduct=" + hexadecimal({device[11], device[10]}) + "\\n\nH: descriptors=" + hex + "\n\n";
 }
 

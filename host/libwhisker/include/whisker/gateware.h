@@ -55,6 +55,10 @@ typedef void (*whisker_gateware_progress)(void *context, uint32_t bytes, uint32_
  */
 int whisker_gateware_update(struct whisker_device *device, const struct whisker_gateware *image,
                             whisker_gateware_progress progress, void *context);
+
+/* Asks a board that takes its firmware as a drive (the Pico) to begin anew as one; it leaves the bus. Stops a run.
+ * Returns 0, DEVICE_REFUSED (no such board), DEVICE_CONTROL, DEVICE_GONE. */
+int whisker_gateware_boot_drive(struct whisker_device *device);
 #pragma GCC visibility pop
 #ifdef __cplusplus
 }

@@ -97,7 +97,7 @@ def usb(root: Path) -> list[Finding]:
     out = []
     for bridge in found:
         out.append(_permission(bridge))
-        if bridge.speed < usbtree.HIGH_SPEED_MBIT:
+        if bridge.speed < usbtree.HIGH_SPEED_MBIT and bridge.product != usbtree.PICO:
             remedy = "use a USB 2.0 cable and port; avoid old hubs"
             out.append(Finding(FAIL, f"bridge {bridge.node} runs at {bridge.speed:g} Mbit/s, not 480", remedy))
         for pid, name in usbtree.holders(bridge, root):

@@ -11,6 +11,7 @@ from ..errors import UserError
 
 TEST_ID = (LIMITS["usb_vendor_id"], LIMITS["usb_product_id"])  # for private tests only
 HIGH_SPEED_MBIT = 480.0
+PICO = "Whisker Pico"  # product of a board that knows no high speed
 
 
 @dataclass(frozen=True)
