@@ -161,7 +161,8 @@ static void create_sim_report_mode(struct emulator *emulator)
 static void create_sim_step(struct emulator *emulator)
 {
     uint8_t bytes[LINE_SIZE];
-    size_t count = create_pty_read(&emulator->pty, bytes, sizeof bytes);
+    const size_t room = SIM_CREATE_IN_MAX - sim_create_queued(emulator->create);
+    size_t count = create_pty_read(&emulator->pty, bytes, room < sizeof bytes ? room : sizeof bytes);
     sim_create_receive(emulator->create, bytes, count);
     create_sim_report_mode(emulator);
     create_ground_drive(emulator->create, emulator->world);

@@ -1,5 +1,5 @@
 /* Options by name: one list for every program that has an emulator in it. */
-#include "sim_create.h"
+#include "sim_create_state.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -26,6 +26,11 @@ static const struct stimulus {
     {"virtual-wall", SIM_CREATE_VIRTUAL_WALL},
     {"charger", SIM_CREATE_CHARGER},
     {"silent", SIM_CREATE_SILENT},
+    {"mute", SIM_CREATE_MUTE},
+    {"deaf", SIM_CREATE_DEAF},
+    {"held", SIM_CREATE_HELD},
+    {"restart", SIM_CREATE_RESTART},
+    {"wake", SIM_CREATE_WAKE},
 };
 
 struct refusal {
@@ -105,7 +110,8 @@ static int options_add_event(struct sim_create_options *options, const char *nam
         return options_refuse(
             refusal, name, value,
             "give bump, bump-left, bump-right, drop-left, drop-right, drop-caster, cliff-left, "
-            "cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger or silent, then @START");
+            "cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger, silent, mute, deaf, held, restart or "
+            "wake, then @START");
     if (value[length] != '@' || !options_read_times(value + length + 1, &event))
         return options_refuse(refusal, name, value,
                               "give seconds after the start, as in bump-left@3s or silent@10+2.5");
@@ -123,6 +129,7 @@ enum option {
     FLIP_BYTES,
     EXTRA_BYTES,
     LOSE_ORDERS,
+    QUEUE,
     EVENT,
     OPTIONS
 };
@@ -139,10 +146,13 @@ static const struct {
     [FLIP_BYTES] = {"flip-bytes", "P", "share of them that have a bit flipped"},
     [EXTRA_BYTES] = {"extra-bytes", "P", "share of them that a random byte follows"},
     [LOSE_ORDERS] = {"lose-orders", "P", "share of the bytes sent to it that are lost"},
+    [QUEUE] = {"queue", NULL, "bytes sent to it wait in an adapter of 4096 bytes and come at the line's pace"},
     [EVENT] = {"event", "WHAT@S[+L]",
                "WHAT happens S seconds after the start, for L (0.5); repeat it for more. WHAT:\n"
                "bump, bump-left, bump-right, drop-left, drop-right, drop-caster, cliff-left,\n"
-               "cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger, silent"},
+               "cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger; of the line:\n"
+               "silent (both wires cut), mute (from it), deaf (to it), held (bytes come at once, late);\n"
+               "restart (its power is off), wake (its button)"},
 };
 
 bool sim_create_describe(size_t number, const char **name, const char **value, const char **help)
@@ -163,6 +173,8 @@ static int options_set_flag(struct sim_create_options *options, enum option opti
         options->battery_low = true;
     else if (option == MODE_PLUS_ONE)
         options->mode_plus_one = true;
+    else if (option == QUEUE)
+        options->queue = true;
     else
         options->angle_factor = CREATE_OI_V3_OLD_ANGLE_UNIT;
     return 0;
@@ -199,4 +211,14 @@ int sim_create_set(struct sim_create_options *options, const char *name, const c
     if ((DESCRIPTIONS[option].value != NULL) != (value != NULL))
         return options_refuse(refusal, name, value ? value : "", value ? "takes no value" : "needs a value");
     return value ? options_set_value(options, option, value, refusal) : options_set_flag(options, option);
+}
+
+const struct sim_create_fault *create_fault_at(const sim_create *create, enum sim_create_spoil spoil, uint64_t place)
+{
+    for (size_t i = 0; i < create->options.faults; i++) {
+        const struct sim_create_fault *fault = &create->options.fault[i];
+        if (fault->spoil == spoil && place >= fault->first && place - fault->first < fault->count)
+            return fault;
+    }
+    return NULL;
 }

@@ -101,6 +101,14 @@ static int32_t sensors_value(sim_create *create, uint8_t id)
     return create->sensor[id];
 }
 
+/* What a frame says of a packet: a lie, where there is one. */
+static int32_t sensors_say(sim_create *create, uint8_t id)
+{
+    const struct sim_create_fault *lie = create_fault_at(create, SIM_CREATE_LIE, create->line.places.frames);
+    const int32_t value = sensors_value(create, id); /* read in any case: counters begin anew */
+    return lie && lie->packet == id ? lie->value : value;
+}
+
 static size_t sensors_report_run(sim_create *create, uint8_t first, uint8_t last, uint8_t *to, size_t room)
 {
     size_t count = 0;
@@ -109,7 +117,7 @@ static size_t sensors_report_run(sim_create *create, uint8_t first, uint8_t last
     if (count > room)
         return 0;
     for (uint8_t id = first; id <= last; id++) {
-        uint32_t bits = (uint32_t)sensors_value(create, id);
+        uint32_t bits = (uint32_t)sensors_say(create, id);
         if (PACKETS[id].bytes == 2)
             *to++ = (uint8_t)(bits >> 8);
         *to++ = (uint8_t)bits;

@@ -44,17 +44,47 @@ static void serial_line_leave(struct create_line *line, uint8_t byte)
         line->left[line->left_count++] = byte;
 }
 
+/* Bytes that come twice are kept until the last of them has left. */
+static void serial_line_repeat(sim_create *create, uint64_t place, uint8_t byte)
+{
+    struct create_line *line = &create->line;
+    const struct sim_create_fault *twice = create_fault_at(create, SIM_CREATE_TWICE, place);
+    if (!twice || line->again_count == sizeof line->again)
+        return;
+    line->again[line->again_count++] = byte;
+    if (place + 1 < twice->first + twice->count)
+        return;
+    for (size_t i = 0; i < line->again_count; i++)
+        serial_line_leave(line, line->again[i]);
+    line->again_count = 0;
+}
+
 static void serial_line_pass(sim_create *create, uint8_t byte)
 {
     const struct sim_create_options *options = &create->options;
     struct sim_rng *rng = &create->line.out_rng;
-    if (create->stimuli & SIM_CREATE_SILENT || serial_line_happens(rng, options->lose))
+    const uint64_t place = create->line.places.sent++;
+    const struct sim_create_fault *flip = create_fault_at(create, SIM_CREATE_FLIP, place);
+    if (create->stimuli & SIM_CREATE_MUTE || serial_line_happens(rng, options->lose) ||
+        create_fault_at(create, SIM_CREATE_LOSE, place))
         return;
     if (serial_line_happens(rng, options->flip))
         byte = (uint8_t)(byte ^ 1u << (sim_rng_next(rng) >> 61));
+    byte = (uint8_t)(byte ^ (flip ? flip->value : 0));
     serial_line_leave(&create->line, byte);
     if (serial_line_happens(rng, options->extra))
         serial_line_leave(&create->line, (uint8_t)(sim_rng_next(rng) >> 56));
+    serial_line_repeat(create, place, byte);
+}
+
+bool create_line_arrives(sim_create *create, uint8_t *byte)
+{
+    const uint64_t place = create->line.places.received++;
+    const struct sim_create_fault *flip = create_fault_at(create, SIM_CREATE_FLIP_ORDER, place);
+    *byte = (uint8_t)(*byte ^ (flip ? flip->value : 0));
+    return !(create->stimuli & (SIM_CREATE_DEAF | SIM_CREATE_RESTART)) && !create->asleep &&
+           !serial_line_happens(&create->line.in_rng, create->options.lose_orders) &&
+           !create_fault_at(create, SIM_CREATE_LOSE_ORDER, place);
 }
 
 void create_line_tick(sim_create *create)
@@ -73,10 +103,4 @@ void create_line_tick(sim_create *create)
     memmove(line->waiting, line->waiting + sent, line->count);
     if (line->count == 0 && line->credit > byte_costs)
         line->credit = byte_costs; /* a line that rests saves up no more than a byte */
-}
-
-bool create_line_arrives(sim_create *create)
-{
-    return !(create->stimuli & SIM_CREATE_SILENT) &&
-           !serial_line_happens(&create->line.in_rng, create->options.lose_orders);
 }

@@ -33,15 +33,37 @@ enum sim_create_stimulus {
     SIM_CREATE_CLIFF_RIGHT = 1 << 8,
     SIM_CREATE_VIRTUAL_WALL = 1 << 9,
     SIM_CREATE_CHARGER = 1 << 10, /* plugged in */
-    SIM_CREATE_SILENT = 1 << 11   /* the line is cut: bytes of both directions are lost */
+    SIM_CREATE_MUTE = 1 << 11,    /* the wire from it is cut: its bytes are lost */
+    SIM_CREATE_DEAF = 1 << 12,    /* the wire to it is cut */
+    SIM_CREATE_HELD = 1 << 13,    /* the adapter keeps its bytes; they come at once afterwards */
+    SIM_CREATE_RESTART = 1 << 14, /* its power is off; then it starts, and says so in text */
+    SIM_CREATE_WAKE = 1 << 15,    /* its button is pressed, or its BRC wire pulled low */
+    SIM_CREATE_SILENT = SIM_CREATE_MUTE | SIM_CREATE_DEAF /* the line is cut */
 };
 
-enum { SIM_CREATE_EVENTS_MAX = 16, SIM_CREATE_OUT_MAX = 4096 };
+enum { SIM_CREATE_EVENTS_MAX = 16, SIM_CREATE_FAULTS_MAX = 16, SIM_CREATE_OUT_MAX = 4096, SIM_CREATE_IN_MAX = 4096, SIM_CREATE_TWICE_MAX = 256 };
 
 /* A stimulus that comes by itself at a time after the start. */
 struct sim_create_event {
     uint32_t stimuli;
     double start_s, length_s;
+};
+
+/* What becomes of some bytes of the line, counted from 0, or of a packet in some frames. */
+enum sim_create_spoil {
+    SIM_CREATE_LOSE,  /* bytes from the robot */
+    SIM_CREATE_FLIP,  /* xor `value` */
+    SIM_CREATE_TWICE, /* they come, and come again, SIM_CREATE_TWICE_MAX at most */
+    SIM_CREATE_LOSE_ORDER,
+    SIM_CREATE_FLIP_ORDER,
+    SIM_CREATE_LIE /* frames whose packet `packet` says `value`, with a right sum */
+};
+
+struct sim_create_fault {
+    enum sim_create_spoil spoil;
+    uint64_t first, count;
+    int32_t value;
+    uint8_t packet;
 };
 
 struct sim_create_options {
@@ -54,8 +76,10 @@ struct sim_create_options {
     double angle_factor;      /* old firmware: what packet 20 is multiplied by; 1: sound */
     double lose, flip, extra; /* share of the bytes sent that are lost, have one bit flipped, have a random one after */
     double lose_orders;       /* share of the bytes received that are lost */
-    size_t events;
+    bool queue;               /* what it receives waits in the host's adapter and comes at the pace of the line */
+    size_t events, faults;
     struct sim_create_event event[SIM_CREATE_EVENTS_MAX];
+    struct sim_create_fault fault[SIM_CREATE_FAULTS_MAX];
 };
 
 /* A sound robot of this version with seed 1. */
@@ -79,8 +103,13 @@ typedef struct sim_create sim_create;
 sim_create *sim_create_new(const struct sim_create_options *options);
 void sim_create_free(sim_create *create);
 
-/* Bytes that have come from the host. They act at once. */
-void sim_create_receive(sim_create *create, const uint8_t *bytes, size_t count);
+/* Bytes from the host, which act at once, or with options.queue in their time. Returns how many had room: all, or with a
+ * queue as many as fill it up to SIM_CREATE_IN_MAX. */
+size_t sim_create_receive(sim_create *create, const uint8_t *bytes, size_t count);
+
+/* The host's adapter throws away what has not left it, and says how much that is. */
+void sim_create_flush(sim_create *create);
+size_t sim_create_queued(const sim_create *create);
 
 /* Lets one tick (500 us) pass. */
 void sim_create_tick(sim_create *create, const struct sim_create_motion *motion);
@@ -92,5 +121,16 @@ size_t sim_create_take(sim_create *create, uint8_t *bytes, size_t size);
 void sim_create_speed(const sim_create *create, double *v_m_s, double *omega_rad_s);
 
 enum create_oi_mode sim_create_mode(const sim_create *create);
+
+/* Bytes and frames sent, and bytes received, so far: the places that faults name. */
+struct sim_create_places {
+    uint64_t sent, received, frames;
+};
+/* What its line goes by: an order may have changed it. */
+unsigned sim_create_baud(const sim_create *create);
+struct sim_create_places sim_create_places(const sim_create *create);
+
+/* One more fault from now on; false: there are SIM_CREATE_FAULTS_MAX. */
+bool sim_create_spoil(sim_create *create, const struct sim_create_fault *fault);
 
 #endif

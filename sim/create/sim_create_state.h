@@ -45,6 +45,12 @@ struct create_line {
     uint64_t credit;    /* what the line could have sent: ticks times baud */
     uint8_t left[SIM_CREATE_OUT_MAX];
     size_t left_count;
+    uint8_t queued[SIM_CREATE_IN_MAX]; /* from the host, still in its adapter */
+    size_t queued_count;
+    uint64_t in_credit;
+    uint8_t again[SIM_CREATE_TWICE_MAX];
+    size_t again_count;
+    struct sim_create_places places;
     struct sim_rng out_rng, in_rng;
 };
 
@@ -62,6 +68,8 @@ struct sim_create {
     uint32_t stimuli;
     double distance_mm, angle_deg; /* counted since the start */
     double charge_mah;
+    uint64_t heard_at; /* tick of the newest byte from the host */
+    bool asleep;
     struct create_reader reader;
     struct create_wheels wheels;
     struct create_line line;
@@ -107,8 +115,10 @@ void create_line_send(struct create_line *line, const uint8_t *bytes, size_t cou
 void create_line_send_frame(struct create_line *line, const uint8_t *bytes, size_t count);
 void create_line_change_baud(sim_create *create, uint8_t code);
 void create_line_tick(sim_create *create);
-/* Does a byte from the host arrive? */
-bool create_line_arrives(sim_create *create);
+/* Does a byte from the host arrive, and as what? */
+bool create_line_arrives(sim_create *create, uint8_t *byte);
+/* The fault of this kind at this place; NULL: there is none. */
+const struct sim_create_fault *create_fault_at(const sim_create *create, enum sim_create_spoil spoil, uint64_t place);
 
 void create_battery_start(sim_create *create);
 void create_battery_tick(sim_create *create);

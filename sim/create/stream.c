@@ -38,4 +38,5 @@ void create_send_frame(sim_create *create)
         sum = (uint8_t)(sum + frame[i]);
     frame[used++] = (uint8_t)-sum;
     create_line_send_frame(&create->line, frame, used);
+    create->line.places.frames++;
 }

@@ -46,7 +46,7 @@ static void test_all_are_described(void **state)
         assert_int_equal(set(&options, name, value ? "?" : NULL), value ? -1 : 0);
         count++;
     }
-    assert_int_equal(count, 10);
+    assert_int_equal(count, 11);
 }
 
 static void test_what_is_refused(void **state)
@@ -57,6 +57,7 @@ static void test_what_is_refused(void **state)
         {"extra-bytes", "0.1x"},   {"lose-orders", ""},    {"lose-bytes", "nan"},      {"old-distance", "0"},
         {"drop-remainder", "yes"}, {"event", "bump-left"}, {"event", "kick@3"},        {"event", "bump@"},
         {"event", "bump@3s+"},     {"event", "bump@-1"},   {"event", "bump@3s+1s+1s"}, {"event", "bump@3 s"},
+        {"queue", "4096"},
     };
     for (size_t i = 0; i < sizeof WRONG / sizeof WRONG[0]; i++) {
         struct sim_create_options options = sim_create_defaults(CREATE_OI_V2);

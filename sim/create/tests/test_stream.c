@@ -199,6 +199,129 @@ static void test_silence(void **state)
     assert_true(robot.count > 300);
 }
 
+/* Each fault at its place of the line: what comes differs from a sound line's there alone. */
+static void test_faults_at_their_places(void **state)
+{
+    (void)state;
+    static const struct {
+        struct sim_create_fault fault;
+        int more;
+    } cases[] = {{{SIM_CREATE_LOSE, 500, 3, 0, 0}, -3},
+                 {{SIM_CREATE_FLIP, 500, 2, 0x21, 0}, 0},
+                 {{SIM_CREATE_TWICE, 500, 40, 0, 0}, 40},
+                 {{SIM_CREATE_LIE, 30, 1, -2, CREATE_OI_DISTANCE}, 0}};
+    const size_t all = hear_clean();
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct sim_create_options options = sim_create_defaults(CREATE_OI_V2);
+        options.faults = 1;
+        options.fault[0] = cases[i].fault;
+        stream_under(options);
+        const size_t place = i == 3 ? 0 : 500;
+        assert_int_equal(robot.count, (int)all + cases[i].more);
+        assert_memory_equal(robot.heard, clean, place);
+        if (i == 1)
+            assert_int_equal(robot.heard[501], clean[501] ^ 0x21);
+        if (i == 2)
+            assert_memory_equal(robot.heard + 540, clean + 500, all - 500);
+        if (i == 3)
+            assert_int_equal(sound_frames(14), (20 * TICKS_PER_S - 1) / PERIOD_TICKS); /* with a right sum */
+    }
+}
+
+static void test_orders_wait_in_the_hosts_adapter(void **state)
+{
+    (void)state;
+    static uint8_t orders[2 * SIM_CREATE_IN_MAX]; /* bytes that mean nothing */
+    struct sim_create_options options = sim_create_defaults(CREATE_OI_V2);
+    options.queue = true;
+    switch_on_with(options);
+    assert_int_equal(sim_create_receive(robot.create, orders, sizeof orders), SIM_CREATE_IN_MAX);
+    assert_int_equal(sim_create_receive(robot.create, orders, 1), 0);
+    pass_ticks(TICKS_PER_S / 10);
+    assert_in_range(sim_create_queued(robot.create), SIM_CREATE_IN_MAX - 576, SIM_CREATE_IN_MAX - 574);
+    sim_create_flush(robot.create);
+    SEND(CREATE_OI_OP_START);
+    assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_OFF);
+    pass_ticks(2);
+    assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_PASSIVE);
+}
+
+static void wait_for(uint32_t stimuli, double start_s, double length_s)
+{
+    struct sim_create_options options = sim_create_defaults(CREATE_OI_V2);
+    options.events = 1;
+    options.event[0] = (struct sim_create_event){stimuli, start_s, length_s};
+    switch_on_with(options);
+    SEND(CREATE_OI_OP_START, CREATE_OI_OP_STREAM, 1, CREATE_OI_MODE);
+}
+
+static void test_one_wire_of_two_is_cut(void **state)
+{
+    (void)state;
+    wait_for(SIM_CREATE_MUTE, 0, 9);
+    pass_ticks(TICKS_PER_S / 2);
+    SEND(CREATE_OI_OP_SAFE);
+    assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_SAFE);
+    assert_int_equal(robot.count, 0);
+    wait_for(SIM_CREATE_DEAF, 0.1, 9);
+    pass_ticks(TICKS_PER_S / 2);
+    SEND(CREATE_OI_OP_SAFE);
+    assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_PASSIVE);
+    assert_true(robot.count > 30 * 5);
+}
+
+static void test_an_adapter_that_holds_bytes_gives_them_all(void **state)
+{
+    (void)state;
+    wait_for(SIM_CREATE_HELD, 0.1, 0.3);
+    pass_ticks(TICKS_PER_S / 5);
+    const size_t held = robot.count;
+    pass_ticks(TICKS_PER_S / 10);
+    assert_int_equal(robot.count, held);
+    pass_ticks(TICKS_PER_S / 5);
+    assert_in_range(sound_frames(5), 31, 33);
+}
+
+static void test_power_that_comes_back_is_told_in_text(void **state)
+{
+    (void)state;
+    wait_for(SIM_CREATE_RESTART, 0.1, 0.1);
+    pass_ticks(TICKS_PER_S / 5 - 1);
+    forget();
+    pass_ticks(TICKS_PER_S / 10);
+    assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_OFF);
+    assert_true(robot.count > 10);
+    assert_non_null(memmem(robot.heard, robot.count, "boot", 4));
+}
+
+static void test_it_sleeps_after_minutes_without_an_order(void **state)
+{
+    (void)state;
+    wait_for(SIM_CREATE_WAKE, CREATE_OI_SLEEP_S + 2, 0.5);
+    for (int second = 0; second < CREATE_OI_SLEEP_S; second++) {
+        assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_PASSIVE);
+        pass_ticks(TICKS_PER_S);
+        forget();
+    }
+    pass_ticks(TICKS_PER_S);
+    SEND(CREATE_OI_OP_START);
+    assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_OFF);
+    pass_ticks(2 * TICKS_PER_S);
+    SEND(CREATE_OI_OP_START);
+    assert_int_equal(sim_create_mode(robot.create), CREATE_OI_MODE_PASSIVE);
+}
+
+static void test_a_charger_is_told_in_text_while_it_is_off(void **state)
+{
+    (void)state;
+    struct sim_create_options options = sim_create_defaults(CREATE_OI_V2);
+    options.events = 1;
+    options.event[0] = (struct sim_create_event){SIM_CREATE_CHARGER, 0, 9};
+    switch_on_with(options);
+    pass_ticks(TICKS_PER_S + TICKS_PER_S / 2);
+    assert_non_null(memmem(robot.heard, robot.count, " mV, 1250 mA\r\n", 14));
+}
+
 static void test_nobody_takes_the_bytes(void **state)
 {
     (void)state;
@@ -224,6 +347,13 @@ int main(void)
         cmocka_unit_test(test_same_seed_same_faults),
         cmocka_unit_test(test_lost_orders),
         cmocka_unit_test(test_silence),
+        cmocka_unit_test(test_faults_at_their_places),
+        cmocka_unit_test(test_orders_wait_in_the_hosts_adapter),
+        cmocka_unit_test(test_one_wire_of_two_is_cut),
+        cmocka_unit_test(test_an_adapter_that_holds_bytes_gives_them_all),
+        cmocka_unit_test(test_power_that_comes_back_is_told_in_text),
+        cmocka_unit_test(test_it_sleeps_after_minutes_without_an_order),
+        cmocka_unit_test(test_a_charger_is_told_in_text_while_it_is_off),
         cmocka_unit_test(test_nobody_takes_the_bytes),
     };
     return cmocka_run_group_tests(tests, NULL, end_robot);
