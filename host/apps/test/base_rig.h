@@ -46,20 +46,32 @@ static inline void serve(int64_t now_ms)
     base_clients_serve(&clients, polled, now_ms);
 }
 
+/* The line carries away what was written to it. */
+static inline void carry_away(void)
+{
+    char bytes[4096];
+    while (recv(line, bytes, sizeof bytes, 0) > 0) {
+    }
+}
+
 static inline void say(int client, const char *message, int64_t now_ms)
 {
     assert_int_equal(send(client, message, strlen(message), 0), strlen(message));
+    carry_away();
     serve(now_ms);
 }
 
-/* One frame of a base in safe mode that was asked for this speed, and in it moved so far. */
-static inline void report_frame(int asked_mm_s, int moved_mm, int64_t now_ms)
+/* One frame of a base in this mode that was asked for this speed, and in it moved so far. Returns its bytes. */
+static inline size_t make_frame(int mode, int asked_mm_s, int moved_mm, uint8_t frame[CREATE_STREAM_BYTES])
 {
-    uint8_t frame[CREATE_STREAM_BYTES], sum = 0;
-    int32_t value[CREATE_OI_PACKET_MAX + 1] = {[CREATE_OI_MODE] = CREATE_OI_MODE_SAFE,
+    uint8_t sum = 0;
+    int32_t value[CREATE_OI_PACKET_MAX + 1] = {[CREATE_OI_MODE] = mode,
                                                [CREATE_OI_DISTANCE] = moved_mm,
                                                [CREATE_OI_REQUESTED_LEFT] = asked_mm_s,
-                                               [CREATE_OI_REQUESTED_RIGHT] = asked_mm_s};
+                                               [CREATE_OI_REQUESTED_RIGHT] = asked_mm_s,
+                                               [CREATE_OI_VOLTAGE] = 14000,
+                                               [CREATE_OI_CHARGE] = 2000,
+                                               [CREATE_OI_CAPACITY] = 2700};
     const struct create_stream *stream = &robot.stream;
     memcpy(frame, stream->expected, stream->length);
     for (size_t at = 2; at + 1 < stream->length;) { /* behind header and length: id, data, id, data */
@@ -72,12 +84,25 @@ static inline void report_frame(int asked_mm_s, int moved_mm, int64_t now_ms)
         sum = (uint8_t)(sum + frame[i]);
     }
     frame[stream->length - 1] = (uint8_t)-sum;
-    assert_int_equal(send(line, frame, stream->length, 0), stream->length);
+    return stream->length;
+}
+
+static inline void report(int mode, int asked_mm_s, int moved_mm, int64_t now_ms)
+{
+    uint8_t frame[CREATE_STREAM_BYTES];
+    const size_t count = make_frame(mode, asked_mm_s, moved_mm, frame);
+    carry_away();
+    assert_int_equal(send(line, frame, count, 0), count);
     assert_true(base_robot_read(&robot, UINT64_MAX, now_ms));
 }
 
-/* A Create 1 that has been opened, without clients. */
-static inline void begin_rig(bool stream_clock, base_on_step *on_step, int64_t now_ms)
+static inline void report_frame(int asked_mm_s, int moved_mm, int64_t now_ms)
+{
+    report(CREATE_OI_MODE_SAFE, asked_mm_s, moved_mm, now_ms);
+}
+
+/* A Create 1 that has been opened, without clients: nothing was heard of it yet. */
+static inline void open_rig(bool stream_clock, base_on_step *on_step, int64_t now_ms)
 {
     static const uint64_t restarts = 0;
     signal(SIGPIPE, SIG_IGN); /* a terminal that is gone gives an error; so shall the socket that stands for it */
@@ -88,6 +113,15 @@ static inline void begin_rig(bool stream_clock, base_on_step *on_step, int64_t n
     base_clients_begin(&clients, &robot, &restarts);
     assert_true(base_robot_open(&robot, pair(SOCK_STREAM, &line), now_ms));
     log_lines = 0;
+}
+
+/* It has entered its mode by now. */
+static inline void begin_rig(bool stream_clock, base_on_step *on_step, int64_t now_ms)
+{
+    open_rig(stream_clock, on_step, now_ms - 2 * CREATE_OI_PERIOD_MS);
+    report(CREATE_OI_MODE_PASSIVE, 0, 0, now_ms - CREATE_OI_PERIOD_MS);
+    report_frame(0, 0, now_ms);
+    carry_away();
 }
 
 static inline void end_rig(void)

@@ -150,7 +150,7 @@ static void check_wheels(void)
     const struct base_client *commander = clients.commander;
     demand(!commander || commander->socket >= 0);
     demand(commander || (robot.speeds.left_mm_s == 0 && robot.speeds.right_mm_s == 0));
-    demand((robot.port >= 0 && !robot.held) || (robot.speeds.left_mm_s == 0 && robot.speeds.right_mm_s == 0));
+    demand(!base_robot_kept(&robot) || (robot.speeds.left_mm_s == 0 && robot.speeds.right_mm_s == 0));
 }
 
 /* ----------------------------------------------------------------------------------------------------------- the steps
@@ -266,7 +266,6 @@ static void act(struct input *input)
         break;
     case 2:
         now_ms += 4 * (int64_t)take(input);
-        base_robot_watch(&robot, now_ms);
         break;
     case 3:
         report_frame(input);
@@ -287,6 +286,7 @@ static void serve(void)
     if (robot.port >= 0 && base_robot_taken(&robot) < limit) {
         base_robot_read(&robot, limit, now_ms);
     }
+    base_robot_watch(&robot, now_ms);
     base_clients_poll(&clients, polled);
     while (poll(polled, BASE_CLIENTS, 0) < 0) { /* libFuzzer's clock has interrupted it */
         demand(errno == EINTR);

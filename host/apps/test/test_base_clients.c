@@ -227,15 +227,15 @@ static void while_one_reason_holds_the_wheels_stand(void **state)
 {
     (void)state;
     assert_true(come(0, OPENED_MS));
-    assert_answer(ask(0, "drive 0.2 0", OPENED_MS), "sent 60 0.2 0");
-    base_robot_hold(&robot, BASE_HOLD_HEARTBEAT, true, OPENED_MS);
+    assert_answer(ask(0, "drive 0.2 0", OPENED_MS + BASE_PACE_MS), "sent 60 0.2 0");
+    base_robot_hold(&robot, BASE_HOLD_HEARTBEAT, true, OPENED_MS + BASE_PACE_MS);
     assert_int_equal(robot.speeds.left_mm_s, 0);
-    base_robot_hold(&robot, BASE_HOLD_SLEEP, true, OPENED_MS);
-    base_robot_hold(&robot, BASE_HOLD_HEARTBEAT, false, OPENED_MS);
-    assert_answer(ask(0, "drive 0.2 0", OPENED_MS), "sent 75 0 0");
-    assert_non_null(strstr(ask(0, "health", OPENED_MS), " held=sleep "));
-    base_robot_hold(&robot, BASE_HOLD_SLEEP, false, OPENED_MS);
-    assert_answer(ask(0, "drive 0.2 0", OPENED_MS), "sent 80 0.2 0");
+    base_robot_hold(&robot, BASE_HOLD_SLEEP, true, OPENED_MS + BASE_PACE_MS);
+    base_robot_hold(&robot, BASE_HOLD_HEARTBEAT, false, OPENED_MS + BASE_PACE_MS);
+    assert_answer(ask(0, "drive 0.2 0", OPENED_MS + 2 * BASE_PACE_MS), "sent 70 0 0");
+    assert_non_null(strstr(ask(0, "health", OPENED_MS + 2 * BASE_PACE_MS), " held=sleep "));
+    base_robot_hold(&robot, BASE_HOLD_SLEEP, false, OPENED_MS + 2 * BASE_PACE_MS);
+    assert_answer(ask(0, "drive 0.2 0", OPENED_MS + 3 * BASE_PACE_MS), "sent 75 0.2 0");
 }
 
 static void a_line_that_stays_silent_is_logged_once_and_then_every_hour(void **state)

@@ -33,4 +33,7 @@ struct base_driver_start {
 #define BASE_STUCK_MS 200
 #define BASE_DEAD_MS 2000
 
+/* Exit code of a driver that could write no stop to a base that it had opened: the guard has to. */
+#define BASE_TURNING 3
+
 #endif

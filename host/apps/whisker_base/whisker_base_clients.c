@@ -8,6 +8,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "whisker_base_orders.h"
+
 #define ANSWER 1024
 _Static_assert(BASE_MESSAGE == 256, "the answer to a longer message says so");
 
@@ -26,8 +28,9 @@ static void whisker_base_clients_drop(struct base_clients *clients, struct base_
     *client = (struct base_client){.socket = -1};
     if (clients->commander == client) {
         clients->commander = NULL;
-        base_log(&clients->log_commander, LOG_NOTE, "the commander has gone; wheels stopped");
         base_robot_stop(clients->robot, clients->now_ms);
+        base_robot_change_commander(clients->robot, false, clients->now_ms);
+        base_log(&clients->log_commander, LOG_NOTE, "the commander has gone; %s", base_robot_fate(clients->robot));
     }
 }
 
@@ -178,6 +181,11 @@ static void whisker_base_clients_answer_sent(struct base_clients *clients, struc
 {
     char text[ANSWER];
     const struct base_robot *robot = clients->robot;
+    if (base_orders_may_turn(robot)) {
+        snprintf(text, sizeof text, "error %s; check the adapter, or switch the base off", base_robot_fate(robot));
+        whisker_base_clients_answer(clients, client, text);
+        return;
+    }
     snprintf(text, sizeof text, "sent %llu %.9g %.9g", (unsigned long long)robot->sent, robot->speeds.v_m_s,
              robot->speeds.omega_rad_s);
     whisker_base_clients_answer(clients, client, text);
@@ -191,8 +199,9 @@ static void whisker_base_clients_note_order(struct base_clients *clients)
 
 static bool whisker_base_clients_may_command(struct base_clients *clients, struct base_client *client)
 {
-    if (!whisker_base_clients_commanded(clients)) {
+    if (!whisker_base_clients_commanded(clients) && clients->commander != client) {
         clients->commander = client;
+        base_robot_change_commander(clients->robot, true, clients->now_ms);
     }
     if (clients->commander != client) {
         whisker_base_clients_answer(clients, client, "error another client commands; end that one first");

@@ -4,14 +4,17 @@
 #include <signal.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "cli.h"
+#include "create/port.h"
 #include "daemon_log.h"
 #include "whisker_base_clients.h"
 #include "whisker_base_sleep.h"
 
 #define ALIVE_MS 50
+#define END_MS 500 /* for a stop to be written at the end; then it is the guard's turn */
 #define ACCEPT_MS 100
 
 enum { GUARD, LISTENING, PORT, BUS, CLIENTS, POLLED = CLIENTS + BASE_CLIENTS };
@@ -168,9 +171,11 @@ static void whisker_base_driver_serve(struct driver *driver)
     if (!driver->start.options->stream_clock) {
         base_sleep_serve(&driver->sleep, cli_now_ms());
     }
-    if (driver->polled[PORT].revents && driver->robot.port >= 0) {
-        base_robot_read(&driver->robot, base_clients_limit(&driver->clients), cli_now_ms());
+    const uint64_t limit = base_clients_limit(&driver->clients);
+    if (driver->robot.port >= 0 && (driver->polled[PORT].revents || !driver->start.options->stream_clock)) {
+        base_robot_read(&driver->robot, limit, cli_now_ms());
     }
+    base_robot_watch(&driver->robot, cli_now_ms()); /* a base that is not heard is stopped before a commander is obeyed */
     base_clients_serve(&driver->clients, &driver->polled[CLIENTS], cli_now_ms());
     if (driver->polled[LISTENING].revents) {
         for (int i = 0;
@@ -208,18 +213,39 @@ static int whisker_base_driver_run(struct driver *driver)
     while (!cli_stop_wanted()) {
         whisker_base_driver_reopen(driver);
         if (!whisker_base_driver_await(driver)) {
-            daemon_log(LOG_ERROR, "cannot wait for %d descriptors: %s; wheels stopped, ending; allow more (ulimit -n)",
-                       POLLED, strerror(errno));
+            const int error = errno;
+            base_robot_stop(&driver->robot, cli_now_ms());
+            daemon_log(LOG_ERROR, "cannot wait for %d descriptors: %s; %s, ending; allow more (ulimit -n)", POLLED,
+                       strerror(error), base_robot_fate(&driver->robot));
             return CLI_FAILED;
         }
         if (driver->polled[GUARD].revents && !whisker_base_driver_take_lease(driver)) {
-            daemon_log(LOG_ERROR, "the guard has died; wheels stopped, ending");
+            base_robot_stop(&driver->robot, cli_now_ms());
+            daemon_log(LOG_ERROR, "the guard has died; %s, ending", base_robot_fate(&driver->robot));
             return CLI_FAILED;
         }
         whisker_base_driver_watch_lease(driver); /* before a commander is obeyed */
         whisker_base_driver_serve(driver);
     }
     return CLI_OK;
+}
+
+/* Stops the wheels, as long as it takes, within bounds. False: no stop could be written to a base that was driven. */
+static bool whisker_base_driver_end(struct driver *driver)
+{
+    const struct timespec pause = {.tv_nsec = BASE_RETRY_MS * 1000000};
+    const int64_t until_ms = cli_now_ms() + END_MS;
+    bool stopped = !driver->opened;
+    while (!stopped && driver->robot.port >= 0 && cli_now_ms() < until_ms) {
+        stopped = base_robot_end(&driver->robot, cli_now_ms());
+        if (!stopped) {
+            nanosleep(&pause, NULL);
+        }
+    }
+    if (driver->robot.port >= 0) {
+        create_port_close(driver->robot.port);
+    }
+    return stopped;
 }
 
 int base_driver_run(const struct base_driver_start *start)
@@ -235,7 +261,7 @@ int base_driver_run(const struct base_driver_start *start)
         base_sleep_begin(&driver.sleep, whisker_base_driver_on_sleep, &driver, cli_now_ms());
     }
     const int code = whisker_base_driver_run(&driver);
-    base_robot_end(&driver.robot, cli_now_ms());
+    const bool stopped = whisker_base_driver_end(&driver);
     base_sleep_end(&driver.sleep);
-    return code;
+    return stopped ? code : BASE_TURNING;
 }

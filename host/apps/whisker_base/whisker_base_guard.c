@@ -7,29 +7,27 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "cli.h"
-#include "create/command.h"
 #include "create/port.h"
 #include "daemon_log.h"
 #include "daemon_notify.h"
 #include "heartbeat.h"
 #include "whisker_base_driver.h"
 #include "whisker_base_log.h"
+#include "whisker_base_robot.h"
+#include "whisker_base_socket.h"
 
-#define BACKLOG 512 /* those who wait are served in turn; who does not fit is not */
 /* A driver that dies so young is not started again at once. */
 #define YOUNG_MS 200
 #define PAUSE_MS 500
 /* Between two looks at the driver, two leases for it, and two feedings of the watchdog: at most. */
 #define LOOK_MS 50
-/* For so long, and so often, another whisker-base on the same socket is looked after. */
-#define VANISH_MS 200
-#define VANISH_LOOKS 20
+/* For so long a stop is tried again when a driver has ended without one. */
+#define END_MS 500
 
 struct guard {
     const struct base_options *options;
@@ -38,6 +36,8 @@ struct guard {
     uint64_t restarts;
     int64_t heard_ms;
     bool stuck;
+    bool stood;                 /* a stop was written since the driver was heard last */
+    bool drove;                 /* there was a port */
     struct heartbeat heartbeat; /* of the supervisor */
     bool orphaned;              /* the supervisor has ended */
     struct base_log_limit log_hang, log_death;
@@ -46,20 +46,37 @@ struct guard {
 /* ---------------------------------------------------------------------------------------------------------- the wheels
  */
 
-static void whisker_base_guard_stop_wheels(struct guard *guard)
+/* Writes a stop; false: there is no port, or no room in it. */
+static bool whisker_base_guard_stop_wheels(struct guard *guard)
 {
-    uint8_t bytes[CREATE_COMMAND_BYTES];
-    if (guard->port >= 0) {
-        create_port_write(guard->port, bytes, create_put_stop(bytes));
+    guard->stood = guard->port >= 0 && create_port_stop(guard->port);
+    return guard->stood;
+}
+
+/* Stops the wheels when a driver has ended, whatever it has done. False: nobody could, and a base was driven. */
+static bool whisker_base_guard_stop_at_end(struct guard *guard, int status)
+{
+    const struct timespec pause = {.tv_nsec = BASE_RETRY_MS * 1000000};
+    const bool stopped = WIFEXITED(status) && WEXITSTATUS(status) != BASE_TURNING;
+    for (int64_t until_ms = cli_now_ms() + END_MS; !whisker_base_guard_stop_wheels(guard) && guard->port >= 0 &&
+                                                   !stopped && cli_now_ms() < until_ms;) {
+        nanosleep(&pause, NULL);
     }
+    return stopped || guard->stood || !guard->drove;
+}
+
+static const char *whisker_base_guard_fate(bool stopped)
+{
+    return stopped ? "wheels stopped" : "no stop could be written: the wheels may turn; switch the base off";
 }
 
 static void whisker_base_guard_hold_port(struct guard *guard, int port)
 {
     if (guard->port >= 0) {
-        close(guard->port);
+        create_port_close(guard->port);
     }
     guard->port = port;
+    guard->drove |= port >= 0;
 }
 
 /* ---------------------------------------------------------------------------------------------------------- the driver
@@ -92,7 +109,7 @@ static bool whisker_base_guard_hear(struct guard *guard)
         return got < 0 && errno == EINTR;
     }
     guard->heard_ms = cli_now_ms();
-    guard->stuck = false;
+    guard->stuck = guard->stood = false;
     if (byte == BASE_PORT || byte == BASE_NO_PORT) {
         whisker_base_guard_hold_port(guard, whisker_base_guard_descriptor_of(&message));
         daemon_notify_ready(byte == BASE_PORT ? "drives the base" : "waiting for the port");
@@ -151,10 +168,12 @@ static void whisker_base_guard_watch_driver(struct guard *guard)
     if (silent_ms < BASE_STUCK_MS) {
         return;
     }
+    if (!guard->stood && whisker_base_guard_stop_wheels(guard) && guard->stuck) {
+        base_log(&guard->log_hang, LOG_WARN, "the driver hangs; wheels stopped");
+    }
     if (!guard->stuck) {
         guard->stuck = true;
-        whisker_base_guard_stop_wheels(guard);
-        base_log(&guard->log_hang, LOG_WARN, "the driver hangs; wheels stopped");
+        base_log(&guard->log_hang, LOG_WARN, "the driver hangs; %s", whisker_base_guard_fate(guard->stood));
     }
     if (silent_ms >= BASE_DEAD_MS) {
         kill(guard->child, SIGKILL);
@@ -218,9 +237,6 @@ static int whisker_base_guard_attend(struct guard *guard)
     } while (whisker_base_guard_look(guard, reported || !guard->options->stream_clock));
     close(guard->driver);
     waitpid(guard->child, &status, 0);
-    if (!WIFEXITED(status)) {
-        whisker_base_guard_stop_wheels(guard);
-    }
     return status;
 }
 
@@ -234,81 +250,33 @@ static void whisker_base_guard_pause_after(const struct guard *guard, int64_t be
     }
 }
 
+/* What whisker-base ends with after its last driver. */
+static int whisker_base_guard_exit_code(int status, bool stopped)
+{
+    if (!stopped) {
+        daemon_log(LOG_ERROR, "%s", whisker_base_guard_fate(stopped));
+        return CLI_FAILED;
+    }
+    return WIFEXITED(status) && WEXITSTATUS(status) != BASE_TURNING ? WEXITSTATUS(status) : CLI_OK;
+}
+
 /* Drivers one after the other, until one ends by itself. */
 static int whisker_base_guard_keep_driver(struct guard *guard)
 {
     while (whisker_base_guard_start_driver(guard)) {
         const int64_t begun_ms = cli_now_ms();
         const int status = whisker_base_guard_attend(guard);
+        const bool stopped = whisker_base_guard_stop_at_end(guard, status);
         if (WIFEXITED(status) || cli_stop_wanted() || guard->orphaned) {
-            return WIFEXITED(status) ? WEXITSTATUS(status) : CLI_OK;
+            return whisker_base_guard_exit_code(status, stopped);
         }
         guard->restarts++;
-        base_log(&guard->log_death, LOG_ERROR, "the driver has died (signal %d); wheels stopped, starting it again",
-                 WTERMSIG(status));
+        base_log(&guard->log_death, LOG_ERROR, "the driver has died (signal %d); %s, starting it again",
+                 WTERMSIG(status), whisker_base_guard_fate(stopped));
         whisker_base_guard_pause_after(guard, begun_ms);
     }
     daemon_log(LOG_ERROR, "cannot start the driver: %s", strerror(errno));
     return CLI_FAILED;
-}
-
-/* ---------------------------------------------------------------------------------------------------------- the socket
- */
-
-/* Whether somebody answers at the address; a socket file of a process that was killed answers nobody. */
-static bool whisker_base_guard_answered(const struct sockaddr_un *address)
-{
-    const int probe = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
-    const bool there = connect(probe, (const struct sockaddr *)address, sizeof *address) == 0;
-    close(probe);
-    return there;
-}
-
-/* A whisker-base that was killed a moment ago may still be about to vanish. Returns whether it has. */
-static bool whisker_base_guard_await_vanished(const struct sockaddr_un *address)
-{
-    const struct timespec pause = {.tv_nsec = VANISH_MS * 1000000L / VANISH_LOOKS};
-    for (int i = 0; i < VANISH_LOOKS; i++) {
-        if (!whisker_base_guard_answered(address)) {
-            return true;
-        }
-        nanosleep(&pause, NULL);
-    }
-    return false;
-}
-
-static bool whisker_base_guard_bind_to(int socket, const struct sockaddr_un *address)
-{
-    if (bind(socket, (const struct sockaddr *)address, sizeof *address) == 0) {
-        return true;
-    }
-    const int error = errno;
-    if (error != EADDRINUSE || !whisker_base_guard_await_vanished(address)) {
-        errno = error;
-        return false;
-    }
-    unlink(address->sun_path);
-    return bind(socket, (const struct sockaddr *)address, sizeof *address) == 0;
-}
-
-static bool whisker_base_guard_open_socket(struct guard *guard)
-{
-    const char *path = guard->options->socket;
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    if (strlen(path) >= sizeof address.sun_path) {
-        daemon_log(LOG_ERROR, "%s: the name is too long; choose a path of less than %zu letters", path,
-                   sizeof address.sun_path);
-        return false;
-    }
-    strcpy(address.sun_path, path);
-    guard->listening = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (guard->listening < 0 || !whisker_base_guard_bind_to(guard->listening, &address) ||
-        listen(guard->listening, BACKLOG) != 0) {
-        daemon_log(LOG_ERROR, "%s: %s; %s", path, strerror(errno),
-                   errno == EADDRINUSE ? "stop the whisker-base that has it" : "choose a path that can be written");
-        return false;
-    }
-    return true;
 }
 
 /* Signals are taken only where a process waits, so that none slips between looking and waiting. */
@@ -333,12 +301,13 @@ int base_guard_run(const struct base_options *options)
                    getenv(HEARTBEAT_VARIABLE));
         return CLI_USAGE;
     }
-    if (!whisker_base_guard_open_socket(&guard)) {
+    struct base_socket clients;
+    if (!base_socket_open(&clients, options->socket)) {
         return CLI_FAILED;
     }
+    guard.listening = clients.listening;
     const int code = whisker_base_guard_keep_driver(&guard);
     whisker_base_guard_hold_port(&guard, -1);
-    close(guard.listening);
-    unlink(options->socket);
+    base_socket_close(&clients);
     return code;
 }

@@ -1,110 +1,26 @@
 #include "whisker_base_robot.h"
 
 #include <errno.h>
+#include <math.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "create/port.h"
+#include "whisker_base_orders.h"
 
-#define READ_BYTES 256
+/* Read in one turn at most: more than a terminal holds, so that the newest frame is known before an order is obeyed. */
+#define READ_BYTES 4096
+#define READS 16
+/* Adapters hold bytes back for up to 16 ms: so late a frame may be and none be missing before it. */
+#define LATE_MS (2 * CREATE_OI_PERIOD_MS)
+/* The base's clock and this one differ by less than 1 %. */
+#define CLOCK_SHARE 0.01
 #define COMMANDER_FRAMES (BASE_COMMANDER_MS / CREATE_OI_PERIOD_MS)
-static const uint8_t packets[] = {
-    CREATE_OI_BUMPS_DROPS,
-    CREATE_OI_CLIFF_LEFT,
-    CREATE_OI_CLIFF_FRONT_LEFT,
-    CREATE_OI_CLIFF_FRONT_RIGHT,
-    CREATE_OI_CLIFF_RIGHT,
-    CREATE_OI_DISTANCE,
-    CREATE_OI_ANGLE,
-    CREATE_OI_VOLTAGE,
-    CREATE_OI_CHARGE,
-    CREATE_OI_CAPACITY,
-    CREATE_OI_CHARGING_SOURCES,
-    CREATE_OI_MODE,
-    CREATE_OI_REQUESTED_RIGHT,
-    CREATE_OI_REQUESTED_LEFT,
-    CREATE_OI_ENCODER_LEFT,
-    CREATE_OI_ENCODER_RIGHT,
-};
-enum { ENCODERS = 2 }; /* the last two: Create 2 only */
-
-static size_t whisker_base_robot_packet_count(const struct base_robot *robot)
-{
-    return sizeof packets - (robot->options->odometry.model == CREATE_2 ? 0 : ENCODERS);
-}
+/* Frames of an earlier request that may still be on their way. */
+#define OWN_FRAMES 5
+#define BOOT_BYTE 0xfe /* of a boot loader that starts again and again, in reports of users */
 
 /* ---------------------------------------------------------------------------------------------------------- the line
  */
-
-static void whisker_base_robot_lose(struct base_robot *robot, const char *doing)
-{
-    base_log(&robot->log.line, LOG_WARN, "%s: %s: %s; plug it in again", robot->options->port, doing, strerror(errno));
-    close(robot->port);
-    robot->port = -1;
-    robot->sent = 0;
-    robot->speeds = (struct create_speeds){0};
-}
-
-static bool whisker_base_robot_order(struct base_robot *robot, const uint8_t *bytes, size_t count)
-{
-    if (robot->port < 0) {
-        return false;
-    }
-    if (!create_port_write(robot->port, bytes, count)) {
-        whisker_base_robot_lose(robot, "cannot write");
-        return false;
-    }
-    robot->sent += count;
-    return true;
-}
-
-static bool whisker_base_robot_order_opcode(struct base_robot *robot, enum create_oi_opcode opcode)
-{
-    uint8_t bytes[CREATE_COMMAND_BYTES];
-    return whisker_base_robot_order(robot, bytes, create_put_opcode(bytes, opcode));
-}
-
-static bool whisker_base_robot_ask_mode(struct base_robot *robot, enum create_oi_mode mode)
-{
-    robot->entered = false;
-    robot->frames_since_mode = 0;
-    robot->wanted = mode;
-    return mode == CREATE_OI_MODE_PASSIVE
-               ? whisker_base_robot_order_opcode(robot, CREATE_OI_OP_START)
-               : whisker_base_robot_order_opcode(robot,
-                                                 mode == CREATE_OI_MODE_FULL ? CREATE_OI_OP_FULL : CREATE_OI_OP_SAFE);
-}
-
-/* Orders the wheels, by a command of so many bytes. A base that is not heard goes by its new speeds from now on. */
-static bool whisker_base_robot_order_wheels(struct base_robot *robot, const uint8_t *bytes, size_t count,
-                                            struct create_speeds speeds, int64_t now_ms)
-{
-    const struct create_speeds before = robot->speeds;
-    const bool ordered = whisker_base_robot_order(robot, bytes, count);
-    if (ordered && (speeds.left_mm_s != before.left_mm_s || speeds.right_mm_s != before.right_mm_s)) {
-        robot->changed_ms = now_ms;
-    }
-    robot->speeds = ordered ? speeds : (struct create_speeds){0};
-    return ordered;
-}
-
-static bool whisker_base_robot_order_speeds(struct base_robot *robot, struct create_speeds speeds, int64_t now_ms)
-{
-    uint8_t bytes[CREATE_COMMAND_BYTES];
-    return whisker_base_robot_order_wheels(
-        robot, bytes, create_put_drive_direct(bytes, speeds.right_mm_s, speeds.left_mm_s), speeds, now_ms);
-}
-
-/* Wheels first, then who commands, then what is reported. arm: enter the wanted mode. */
-static bool whisker_base_robot_start_base(struct base_robot *robot, bool arm, int64_t now_ms)
-{
-    uint8_t bytes[CREATE_COMMAND_BYTES];
-    return whisker_base_robot_order_wheels(robot, bytes, create_put_stop(bytes), (struct create_speeds){0}, now_ms) &&
-           whisker_base_robot_order_opcode(robot, CREATE_OI_OP_START) &&
-           (!arm || whisker_base_robot_ask_mode(robot, robot->wanted)) &&
-           whisker_base_robot_order(robot, bytes,
-                                    create_put_stream(bytes, packets, whisker_base_robot_packet_count(robot)));
-}
 
 static void whisker_base_robot_add_counts(struct create_stream_counts *sum, const struct create_stream_counts *counts)
 {
@@ -124,6 +40,8 @@ static const char *whisker_base_robot_remedy(int error)
         return "no permission; join its group: sudo adduser $USER dialout, then log in again";
     case EWOULDBLOCK:
         return "another process drives it; stop that";
+    case EBUSY:
+        return "another process drives it or has it for itself, as a terminal program or ModemManager; end that";
     case ENOTTY:
         return "it is no serial port; choose another";
     default:
@@ -131,11 +49,18 @@ static const char *whisker_base_robot_remedy(int error)
     }
 }
 
+/* The mode that nobody has to ask for. */
+static enum create_oi_mode whisker_base_robot_own_mode(const struct base_robot *robot)
+{
+    return robot->options->full ? CREATE_OI_MODE_FULL : CREATE_OI_MODE_SAFE;
+}
+
 void base_robot_begin(struct base_robot *robot, const struct base_options *options, base_on_step *on_step,
                       void *context)
 {
     *robot = (struct base_robot){.options = options, .on_step = on_step, .context = context, .port = -1};
-    robot->wanted = options->full ? CREATE_OI_MODE_FULL : CREATE_OI_MODE_SAFE;
+    robot->wanted = whisker_base_robot_own_mode(robot);
+    robot->phase = BASE_RESTING;
     create_odometry_begin(&robot->odometry, &options->odometry);
 }
 
@@ -149,15 +74,21 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
         }
         return false;
     }
+    create_port_forget(robot->port); /* what was said before is not believed */
     robot->error = 0;
     robot->sent = 0;
     robot->silent = false;
-    robot->opened_ms = now_ms;
+    robot->requests += robot->options->stream_clock ? 0 : (unsigned)now_ms; /* a driver before had orders of its own */
+    robot->emptied_ms = now_ms;
+    robot->phase_frames = 0;
     whisker_base_robot_add_counts(&robot->past, &robot->stream.counts);
-    create_stream_begin(&robot->stream, packets, whisker_base_robot_packet_count(robot));
+    robot->stream = robot->before = (struct create_stream){0};
+    robot->answered = false;
+    robot->frame = (struct create_frame){0};
     daemon_log(LOG_DETAIL, "%s: open, %s at %u baud", robot->options->port,
                create_model_facts(robot->options->odometry.model)->name, robot->options->baud);
-    return whisker_base_robot_start_base(robot, true, now_ms);
+    base_request(robot, now_ms);
+    return robot->port >= 0;
 }
 
 uint64_t base_robot_frames(const struct base_robot *robot)
@@ -176,8 +107,14 @@ uint64_t base_robot_taken(const struct base_robot *robot)
 static void whisker_base_robot_stop_commander(struct base_robot *robot, int64_t now_ms)
 {
     robot->commander_stops++;
-    base_log(&robot->log.commander, LOG_WARN, "the commander is silent; wheels stopped");
     base_robot_stop(robot, now_ms);
+    base_log(&robot->log.commander, LOG_WARN, "the commander is silent; %s", base_robot_fate(robot));
+}
+
+/* Since when the base is silent: the newest frame that it was asked for, or when it was asked. */
+static int64_t whisker_base_robot_heard_ms(const struct base_robot *robot)
+{
+    return robot->answered && robot->frame_ms > robot->opened_ms ? robot->frame_ms : robot->opened_ms;
 }
 
 static bool whisker_base_robot_moving(const struct base_robot *robot)
@@ -185,19 +122,38 @@ static bool whisker_base_robot_moving(const struct base_robot *robot)
     return robot->speeds.left_mm_s != 0 || robot->speeds.right_mm_s != 0;
 }
 
-/* Frames that time says are missing, beside those that the bytes show: the line was gone or silent. */
-static uint32_t whisker_base_robot_frames_of_gap(const struct base_robot *robot, int64_t now_ms)
+/* When a frame that is read now was said, at the latest: one each period since there was nothing more to read. */
+static int64_t whisker_base_robot_date(const struct base_robot *robot, int64_t now_ms)
 {
-    const int64_t gap_ms = now_ms - robot->frame_ms;
-    const bool gap = !robot->options->stream_clock && robot->frame_ms > 0 && gap_ms >= BASE_SILENCE_MS;
-    return gap ? (uint32_t)(gap_ms / CREATE_OI_PERIOD_MS - 1) : 0;
+    const int64_t after_ms = robot->frame_ms > robot->emptied_ms ? robot->frame_ms : robot->emptied_ms;
+    const int64_t said_ms = after_ms + CREATE_OI_PERIOD_MS;
+    return robot->options->stream_clock || said_ms > now_ms ? now_ms : said_ms;
 }
 
-/* Counts the missed frames since other speeds were ordered. */
-static uint32_t whisker_base_robot_frames_since_change(const struct base_robot *robot, int64_t now_ms)
+/* Holds a frame against the clock: how many are missing before it, or that it is one of those. A gap counts from
+ * LATE_MS on; a shorter one if bytes were skipped as well. What came soonest shows when frames are due. */
+static void whisker_base_robot_time_frame(struct base_robot *robot, int64_t said_ms)
 {
-    const uint32_t since = (uint32_t)((now_ms - robot->changed_ms) / CREATE_OI_PERIOD_MS);
-    return robot->changed_ms <= robot->frame_ms ? 0 : since < robot->frame.missed ? since : robot->frame.missed;
+    struct create_frame *frame = &robot->frame;
+    const double due_ms = robot->schedule_ms + CREATE_OI_PERIOD_MS, behind_ms = (double)said_ms - due_ms;
+    if (robot->options->stream_clock || robot->schedule_ms <= 0) {
+        robot->schedule_ms = (double)said_ms;
+        return;
+    }
+    const bool early = behind_ms < -0.5 * CREATE_OI_PERIOD_MS;
+    if (early && robot->pending > 0) {
+        robot->pending--;
+        frame->timing = CREATE_LATE;
+        frame->missed = 0;
+        return;
+    }
+    const uint32_t passed = behind_ms > 0 ? (uint32_t)lround(behind_ms / CREATE_OI_PERIOD_MS) : 0;
+    const uint32_t skipped = frame->missed < passed ? frame->missed : passed;
+    frame->timing = early ? CREATE_SURPLUS : CREATE_IN_TIME;
+    frame->missed = behind_ms >= LATE_MS ? passed : skipped;
+    robot->pending = frame->missed - skipped;
+    const double next_ms = due_ms + frame->missed * (double)CREATE_OI_PERIOD_MS;
+    robot->schedule_ms = fmin((double)said_ms, next_ms + CLOCK_SHARE * CREATE_OI_PERIOD_MS);
 }
 
 static void whisker_base_robot_log_back(struct base_robot *robot)
@@ -208,18 +164,41 @@ static void whisker_base_robot_log_back(struct base_robot *robot)
     }
 }
 
+static void whisker_base_robot_log_carried(struct base_robot *robot)
+{
+    base_log(&robot->log.carried, LOG_WARN,
+             "%s: the base says what its wheels cannot have done: it was carried or pushed, or the line is bad; taken for "
+             "what was asked of it",
+             robot->options->port);
+}
+
+/* The motion of the newest frame to all who want it. */
+static void whisker_base_robot_step(struct base_robot *robot)
+{
+    const uint64_t carried = robot->odometry.carried;
+    const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
+    const bool more = robot->odometry.carried > carried;
+    robot->on_step(robot->context, &step, base_robot_bits(robot) | (more ? BASE_CARRIED : 0u));
+    if (more) {
+        whisker_base_robot_log_carried(robot);
+    }
+}
+
 static void whisker_base_robot_take_frame(struct base_robot *robot, int64_t now_ms)
 {
-    const uint32_t gap = whisker_base_robot_frames_of_gap(robot, now_ms);
-    robot->frame.missed = gap > robot->frame.missed ? gap : robot->frame.missed;
-    robot->frame.ordered = gap > 0 ? whisker_base_robot_frames_since_change(robot, now_ms) : 0;
+    const int64_t said_ms = whisker_base_robot_date(robot, now_ms);
+    whisker_base_robot_time_frame(robot, said_ms);
+    robot->frame.ordered = base_orders_take(robot, said_ms);
     robot->missed += robot->frame.missed;
-    robot->frame_ms = now_ms;
-    robot->silent = false;
-    whisker_base_robot_log_back(robot);
-    const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
-    base_robot_handle_frame(robot);
-    robot->on_step(robot->context, &step, base_robot_bits(robot));
+    robot->missed -= robot->frame.timing == CREATE_LATE;
+    robot->frame_ms = said_ms;
+    robot->silent = now_ms - said_ms >= BASE_SILENCE_MS;
+    if (robot->answered) {
+        robot->unframed = (struct base_unframed){0};
+        whisker_base_robot_log_back(robot);
+    }
+    base_robot_handle_frame(robot, now_ms);
+    whisker_base_robot_step(robot);
     robot->frames_since_drive += 1 + robot->frame.missed;
     if (robot->options->stream_clock && whisker_base_robot_moving(robot) &&
         robot->frames_since_drive >= COMMANDER_FRAMES) {
@@ -227,20 +206,44 @@ static void whisker_base_robot_take_frame(struct base_robot *robot, int64_t now_
     }
 }
 
+/* A byte that may belong to no frame: what it looks like. */
+static void whisker_base_robot_look_at(struct base_robot *robot, uint8_t byte)
+{
+    struct base_unframed *unframed = &robot->unframed;
+    unframed->all++;
+    unframed->text += (byte >= ' ' && byte <= '~') || byte == '\r' || byte == '\n';
+    unframed->boot += byte == BOOT_BYTE;
+    const bool length = unframed->before == CREATE_OI_STREAM_HEADER;
+    unframed->own += length && byte == robot->stream.length - CREATE_OI_STREAM_OVERHEAD;
+    unframed->other += length && byte == base_request_other_bytes(robot);
+    unframed->before = byte;
+}
+
 bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
 {
     uint8_t bytes[READ_BYTES];
-    const uint64_t left = limit - base_robot_taken(robot);
-    const int got = create_port_read(robot->port, bytes, left < sizeof bytes ? (size_t)left : sizeof bytes);
-    if (got < 0) {
-        whisker_base_robot_lose(robot, "the line is gone");
-        return false;
-    }
-    for (int i = 0; i < got; i++) {
-        if (create_stream_push(&robot->stream, bytes[i], &robot->frame)) {
-            whisker_base_robot_take_frame(robot, now_ms);
+    for (int reads = 0; reads < READS && robot->port >= 0; reads++) {
+        const uint64_t left = limit - base_robot_taken(robot);
+        const size_t room = left < sizeof bytes ? (size_t)left : sizeof bytes;
+        const int got = create_port_read(robot->port, bytes, room);
+        if (got < 0) {
+            base_orders_lose(robot, "the line is gone");
+            return false;
+        }
+        for (int i = 0; i < got; i++) {
+            whisker_base_robot_look_at(robot, bytes[i]);
+            const bool asked = create_stream_push(&robot->stream, bytes[i], &robot->frame);
+            robot->answered |= asked;
+            if (asked || (!robot->answered && robot->before.length > 0 &&
+                          create_stream_push(&robot->before, bytes[i], &robot->frame))) {
+                whisker_base_robot_take_frame(robot, now_ms);
+            }
+        }
+        if ((size_t)got < sizeof bytes) {
+            break;
         }
     }
+    robot->emptied_ms = now_ms;
     return robot->port >= 0;
 }
 
@@ -255,21 +258,24 @@ bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s
     const struct create_speeds wanted =
         base_robot_kept(robot) ? (struct create_speeds){0}
                                : create_choose_speeds(settings->model, settings->wheel_base_m, v_m_s, omega_rad_s);
-    return whisker_base_robot_order_speeds(robot, wanted, now_ms);
+    base_orders_wheels(robot, wanted, now_ms);
+    return robot->port >= 0 && !base_orders_may_turn(robot);
 }
 
 bool base_robot_stop(struct base_robot *robot, int64_t now_ms)
 {
-    return whisker_base_robot_order_speeds(robot, (struct create_speeds){0}, now_ms);
+    base_orders_wheels(robot, (struct create_speeds){0}, now_ms);
+    return robot->port >= 0 && !base_orders_may_turn(robot);
 }
 
 static void whisker_base_robot_log_hold(struct base_robot *robot, enum base_hold reason, bool on)
 {
     const bool heartbeat = reason == BASE_HOLD_HEARTBEAT;
     if (on) {
-        base_log(&robot->log.hold, heartbeat ? LOG_ERROR : LOG_NOTE, "%s; wheels stopped",
+        base_log(&robot->log.hold, heartbeat ? LOG_ERROR : LOG_NOTE, "%s; %s",
                  heartbeat ? "no heartbeat: the guard or the supervisor hangs"
-                           : "the machine is about to sleep or to be shut down");
+                           : "the machine is about to sleep or to be shut down",
+                 base_robot_fate(robot));
     } else {
         base_log(&robot->log.hold, LOG_NOTE, "%s; the commander may drive again",
                  heartbeat ? "the heartbeat is back" : "the machine is awake");
@@ -290,57 +296,94 @@ void base_robot_hold(struct base_robot *robot, enum base_hold reason, bool on, i
 
 bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t now_ms)
 {
-    return base_robot_stop(robot, now_ms) && whisker_base_robot_ask_mode(robot, mode);
+    const bool stopped = base_robot_stop(robot, now_ms);
+    base_robot_ask_mode(robot, mode, now_ms);
+    return stopped;
 }
 
-/* A line that stays silent is reported once, and then every hour. */
-static void whisker_base_robot_log_silence(struct base_robot *robot, int64_t now_ms)
+void base_robot_change_commander(struct base_robot *robot, bool taken, int64_t now_ms)
 {
-    if (robot->reported_ms == 0 || now_ms - robot->reported_ms >= BASE_TELL_MS) {
-        robot->reported_ms = now_ms;
-        base_log(&robot->log.silence, LOG_WARN,
-                 "%s: no frame for %d ms; wheels stopped, stream asked for again every %d ms; check cable, --baud and "
-                 "battery",
-                 robot->options->port, BASE_SILENCE_MS, BASE_SILENCE_MS);
+    const enum create_oi_mode own = whisker_base_robot_own_mode(robot);
+    if (robot->wanted == own || (robot->wanted == CREATE_OI_MODE_PASSIVE && !taken)) {
+        return;
+    }
+    if (robot->left) {
+        robot->wanted = own;
+    } else {
+        base_robot_mode(robot, own, now_ms);
     }
 }
 
-/* Bytes have stopped: stopped wheels are all that can be had without seeing. The mode is entered again only if the base
- * was in it: a base that left it by itself waits for the commander. */
+/* Why nothing is heard, by what has come since. */
+static const char *whisker_base_robot_cause(const struct base_unframed *unframed)
+{
+    return unframed->own > OWN_FRAMES
+               ? "it sends frames, but not those that it was asked for: it does not hear; check the wire to it"
+           : unframed->all == 0 ? "nothing comes: it is off or asleep (press its power button), or the cable is out"
+           : unframed->other > 0
+               ? "it sends what the other model would; give --model 1 for a Create 1, --model 2 for a Create 2"
+           : 2 * unframed->text > unframed->all
+               ? "it sends text: it is starting, or rests on its charger; take it off that and switch it on"
+           : 2 * unframed->boot > unframed->all ? "its boot loader starts again and again; charge its battery"
+                                                : "what comes is no frame; check --baud, --model and the cable";
+}
+
+/* A line that stays silent is reported once, and then every hour. */
+static void whisker_base_robot_log_silence(struct base_robot *robot, const struct base_unframed *unframed,
+                                           int64_t now_ms)
+{
+    if (robot->reported_ms == 0 || now_ms - robot->reported_ms >= BASE_TELL_MS) {
+        robot->reported_ms = now_ms;
+        base_log(&robot->log.silence, LOG_WARN, "%s: no frame for %d ms: %s; ordered to stop, asked again every %d ms",
+                 robot->options->port, BASE_SILENCE_MS, whisker_base_robot_cause(unframed), BASE_SILENCE_MS);
+    }
+}
+
+/* Frames have stopped: stopped wheels are all that can be had without seeing. A base that left its mode by itself before
+ * waits for the commander. */
 static void whisker_base_robot_restart_stream(struct base_robot *robot, int64_t now_ms)
 {
     robot->silences++;
-    robot->silent = robot->stream.counts.frames > 0;
-    robot->opened_ms = now_ms;
-    whisker_base_robot_log_silence(robot, now_ms);
-    whisker_base_robot_start_base(robot, robot->entered || robot->stream.counts.frames == 0, now_ms);
+    robot->silent = true;
+    robot->phase_frames = 0;
+    const struct base_unframed unframed = robot->unframed;
+    base_request(robot, now_ms);
+    whisker_base_robot_log_silence(robot, &unframed, now_ms);
+}
+
+static int64_t whisker_base_robot_least(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
 }
 
 int base_robot_watch(struct base_robot *robot, int64_t now_ms)
 {
+    base_orders_flush(robot, now_ms);
+    const int64_t request_ms = base_request_due(robot, now_ms, BASE_SILENCE_MS);
     if (robot->options->stream_clock || robot->port < 0) {
-        return BASE_REOPEN_MS;
+        return (int)base_orders_due_ms(robot, now_ms, BASE_REOPEN_MS);
     }
     if (whisker_base_robot_moving(robot) && now_ms - robot->drive_ms >= BASE_COMMANDER_MS) {
         whisker_base_robot_stop_commander(robot, now_ms);
     }
-    const int64_t heard_ms = robot->frame_ms > robot->opened_ms ? robot->frame_ms : robot->opened_ms;
-    if (now_ms - heard_ms >= BASE_SILENCE_MS) {
+    if (now_ms - whisker_base_robot_heard_ms(robot) >= BASE_SILENCE_MS) {
         whisker_base_robot_restart_stream(robot, now_ms);
-        return BASE_SILENCE_MS;
     }
-    const int64_t silence_ms = heard_ms + BASE_SILENCE_MS - now_ms;
+    const int64_t silence_ms = whisker_base_robot_heard_ms(robot) + BASE_SILENCE_MS - now_ms;
     const int64_t commander_ms =
         whisker_base_robot_moving(robot) ? robot->drive_ms + BASE_COMMANDER_MS - now_ms : silence_ms;
-    return (int)(commander_ms < silence_ms ? commander_ms : silence_ms);
+    return (int)base_orders_due_ms(
+        robot, now_ms, whisker_base_robot_least(request_ms, whisker_base_robot_least(commander_ms, silence_ms)));
 }
 
-void base_robot_end(struct base_robot *robot, int64_t now_ms)
+bool base_robot_end(struct base_robot *robot, int64_t now_ms)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
-    if (base_robot_stop(robot, now_ms) && whisker_base_robot_order(robot, bytes, create_put_pause(bytes)) &&
-        whisker_base_robot_order_opcode(robot, CREATE_OI_OP_START)) {
-        close(robot->port);
+    robot->may_turn = true;
+    const bool stopped = base_robot_stop(robot, now_ms);
+    if (stopped) {
+        base_orders_write(robot, bytes, create_put_pause(bytes));
+        base_orders_write(robot, bytes, create_put_opcode(bytes, CREATE_OI_OP_START));
     }
-    robot->port = -1;
+    return stopped;
 }

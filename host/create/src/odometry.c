@@ -8,10 +8,14 @@
 #define ANGLE_UNIT_RAD (3.14159265358979323846 / 180.0) /* of packet 20 */
 /* A unit dropped costs half a unit on average: at this many units per frame, as much as the paper's 5 %. */
 #define WELL_ABOVE 10
-/* What is estimated for frames that never came may be wrong by all of it. */
-#define ESTIMATE_SIGMA 1.0
 #define SPEED_MAX_M_S (CREATE_OI_SPEED_MAX_MM_S * 1e-3)
-#define PLAUSIBLE 1.1 /* times the greatest speed: encoders that moved further have begun anew */
+#define DRIVEN 1.1 /* times the greatest speed, or the one asked for: wheels of 10 % more than nominal */
+/* A base that is pushed goes no faster than a person in haste, for as long as nobody notices that it is not heard. */
+#define PUSHED_M_S 2.0
+#define PUSHED_MOST_S 0.5
+/* A frame's motion may be of so much more time: what adapters hold bytes back. */
+#define HELD_S (2 * PERIOD_S)
+#define UNIFORM_SIGMA 0.28867513459481287 /* of a number anywhere between two that lie 1 apart */
 
 void create_odometry_defaults(struct create_odometry_settings *settings, enum create_model model)
 {
@@ -54,16 +58,24 @@ const char *create_source_name(enum create_source source)
     return names[source];
 }
 
+/* A wheel's speed as asked for, m/s. No order can ask for more: a frame that says so is wrong. */
+static double odometry_asked_speed(const struct create_frame *frame, enum create_oi_packet packet)
+{
+    return fmax(-SPEED_MAX_M_S, fmin(SPEED_MAX_M_S, frame->value[packet] * 1e-3));
+}
+
 static double odometry_asked_distance(const struct create_frame *frame)
 {
-    const int32_t both = frame->value[CREATE_OI_REQUESTED_RIGHT] + frame->value[CREATE_OI_REQUESTED_LEFT];
-    return both * 0.5e-3 * PERIOD_S;
+    return (odometry_asked_speed(frame, CREATE_OI_REQUESTED_RIGHT) +
+            odometry_asked_speed(frame, CREATE_OI_REQUESTED_LEFT)) /
+           2 * PERIOD_S;
 }
 
 static double odometry_asked_angle(const struct create_odometry *odometry, const struct create_frame *frame)
 {
-    const int32_t apart = frame->value[CREATE_OI_REQUESTED_RIGHT] - frame->value[CREATE_OI_REQUESTED_LEFT];
-    return apart * 1e-3 / odometry->settings.wheel_base_m * PERIOD_S;
+    return (odometry_asked_speed(frame, CREATE_OI_REQUESTED_RIGHT) -
+            odometry_asked_speed(frame, CREATE_OI_REQUESTED_LEFT)) /
+           odometry->settings.wheel_base_m * PERIOD_S;
 }
 
 static bool odometry_counts_encoders(const struct create_odometry_settings *settings)
@@ -72,13 +84,23 @@ static bool odometry_counts_encoders(const struct create_odometry_settings *sett
            (settings->policy == CREATE_AUTO && create_model_facts(settings->model)->count_m > 0);
 }
 
-/* The source of a part of the motion, of which so many units were asked for, where there are no encoders. */
-static enum create_source odometry_choose(const struct create_odometry *odometry, double asked)
+/* Whether more is reported, or the opposite, than whole units and the wheels' spread make of what was asked for: somebody
+ * moves the body. */
+static bool odometry_exceeds(double asked, double reported)
 {
-    const bool trusted = odometry->remainder == CREATE_KEPT || fabs(asked) >= WELL_ABOVE;
-    const bool reported = odometry->settings.policy == CREATE_REPORTED ||
-                          (odometry->settings.policy == CREATE_AUTO && trusted) || odometry->standing == CREATE_STANDS;
-    return reported ? CREATE_REPORTED : CREATE_REQUESTED;
+    const double along = asked < 0 ? -reported : reported;
+    return along >= fabs(asked) * (1 + ODOMETRY_SPREAD) + 1 || along <= -1;
+}
+
+/* The source of a part of the motion, of which so many units were asked for and reported, where there are no encoders.
+ */
+static enum create_source odometry_choose(const struct create_odometry *odometry, double asked, double reported)
+{
+    const bool trusted =
+        odometry->remainder == CREATE_KEPT || fabs(asked) >= WELL_ABOVE || odometry_exceeds(asked, reported);
+    const bool counts = odometry->settings.policy == CREATE_REPORTED ||
+                        (odometry->settings.policy == CREATE_AUTO && trusted) || odometry->standing == CREATE_STANDS;
+    return counts ? CREATE_REPORTED : CREATE_REQUESTED;
 }
 
 static int32_t odometry_counted(int32_t now, int32_t before)
@@ -86,25 +108,31 @@ static int32_t odometry_counted(int32_t now, int32_t before)
     return (int16_t)(uint16_t)(now - before);
 }
 
-/* Motion of both wheels by their encoders, m. False: they have begun anew, or the frame is the first. */
+/* Motion of both wheels by their encoders, m. False: the frame is the first. */
 static bool odometry_count_wheels(struct create_odometry *odometry, const struct create_frame *frame, double *left,
                                   double *right)
 {
     const double count_m = create_model_facts(odometry->settings.model)->count_m;
-    const double most_m = (frame->missed + 1) * PERIOD_S * SPEED_MAX_M_S * PLAUSIBLE;
     const bool started = odometry->started;
     *left = odometry_counted(frame->value[CREATE_OI_ENCODER_LEFT], odometry->left) * count_m;
     *right = odometry_counted(frame->value[CREATE_OI_ENCODER_RIGHT], odometry->right) * count_m;
     odometry->left = frame->value[CREATE_OI_ENCODER_LEFT];
     odometry->right = frame->value[CREATE_OI_ENCODER_RIGHT];
     odometry->started = true;
-    return started && fabs(*left) <= most_m && fabs(*right) <= most_m;
+    return started;
 }
 
-/* What one frame of this source says, and how surely. */
+/* What one frame of this source says, and how surely: by a share of it, for itself alone, and to a unit. */
 struct reading {
-    double motion, sigma, grain;
+    double motion, sigma, loose, grain;
 };
+
+/* Motion by requested speeds. Those of a frame are of its end: what has changed did so at any time since the one before,
+ * and what a start is thought to be more a stop is less. */
+static struct reading odometry_request(const struct create_odometry *odometry, double was, double now, double scale)
+{
+    return (struct reading){now * scale, odometry->settings.requested_sigma, UNIFORM_SIGMA * fabs(now - was), 0};
+}
 
 static struct reading odometry_read_distance(const struct create_odometry *odometry, const struct create_frame *frame,
                                              double asked)
@@ -112,9 +140,9 @@ static struct reading odometry_read_distance(const struct create_odometry *odome
     const struct create_odometry_settings *settings = &odometry->settings;
     if (odometry->distance == CREATE_REPORTED) {
         return (struct reading){frame->value[CREATE_OI_DISTANCE] * DISTANCE_UNIT_M * settings->distance_scale,
-                                settings->relative_sigma, DISTANCE_UNIT_M};
+                                settings->relative_sigma, 0, DISTANCE_UNIT_M};
     }
-    return (struct reading){asked * settings->distance_scale, settings->requested_sigma, 0};
+    return odometry_request(odometry, odometry->asked_m, asked, settings->distance_scale);
 }
 
 static struct reading odometry_read_angle(const struct create_odometry *odometry, const struct create_frame *frame,
@@ -123,9 +151,9 @@ static struct reading odometry_read_angle(const struct create_odometry *odometry
     const struct create_odometry_settings *settings = &odometry->settings;
     if (odometry->angle == CREATE_REPORTED) {
         return (struct reading){frame->value[CREATE_OI_ANGLE] * ANGLE_UNIT_RAD * settings->angle_scale,
-                                settings->relative_sigma, ANGLE_UNIT_RAD};
+                                settings->relative_sigma, 0, ANGLE_UNIT_RAD};
     }
-    return (struct reading){asked * settings->angle_scale, settings->requested_sigma, 0};
+    return odometry_request(odometry, odometry->asked_rad, asked, settings->angle_scale);
 }
 
 static struct create_step odometry_step_of(const struct create_odometry *odometry, struct reading distance,
@@ -137,33 +165,82 @@ static struct create_step odometry_step_of(const struct create_odometry *odometr
         .scale_distance = fabs(distance.motion) * distance.sigma,
         .scale_angle = fabs(angle.motion) * angle.sigma,
         .scale_drift = fabs(distance.motion) * odometry->settings.drift_rad_per_m,
+        .loose_distance = distance.loose,
+        .loose_angle = angle.loose,
         .grain_distance = distance.grain,
         .grain_angle = angle.grain,
     };
 }
 
-/* Adds what was asked for in frames that never came: until other speeds were ordered what it was before, then what it
- * is now, for then the base has heard the order or goes on as it did. A turn that is read may be wrong by a whole one:
- * both are loose. */
-static void odometry_add_estimate(struct create_odometry *odometry, struct create_step *step,
+/* A part of the motion of a frame that never came, and how sure it is. */
+struct estimate {
+    double motion, sigma;
+};
+
+/* Of each of so many frames. Nobody has ordered other speeds: what was asked for before, and if it has changed, at any time
+ * between. Otherwise what was ordered, if the base has heard the last order, or it went on as before; of several it may
+ * have heard only the last. */
+static struct estimate odometry_estimate(const struct create_odometry *odometry, const struct create_frame *frame,
+                                         double was, double now, double ordered, double way)
+{
+    const struct create_ordered *orders = &frame->ordered;
+    const double all = frame->missed + 1.0;
+    const double motion = !orders->changed ? (was + now) / 2 : orders->heard ? ordered / all : was;
+    const double doubt = orders->changed ? fmax(way / all, fabs(was)) : UNIFORM_SIGMA * fabs(now - was);
+    const double share = odometry->standing == CREATE_STANDS ? 0 : 1;
+    return (struct estimate){share * motion, share * hypot(doubt, odometry->settings.requested_sigma * motion)};
+}
+
+/* Adds what frames that never came are thought to be worth. */
+static void odometry_add_estimate(struct create_odometry *odometry, struct create_step *step, double frames,
                                   const struct create_frame *frame)
 {
-    const bool stands = odometry->standing == CREATE_STANDS;
-    const double after = stands ? 0 : frame->ordered, before = stands ? 0 : frame->missed - frame->ordered;
-    const double distance = before * odometry->asked_m + after * odometry_asked_distance(frame);
-    const double angle = before * odometry->asked_rad + after * odometry_asked_angle(odometry, frame);
-    step->distance += distance;
-    step->angle += angle;
-    /* Of a stop ordered more than once, it may have heard only the last. */
-    const double all = stands ? 0 : frame->missed;
-    step->loose_distance = ESTIMATE_SIGMA * fmax(fabs(distance), all * fabs(odometry->asked_m));
-    step->loose_angle = ESTIMATE_SIGMA * fmax(fabs(angle), all * fabs(odometry->asked_rad));
-    odometry->estimated += frame->missed;
+    const struct create_ordered *orders = &frame->ordered;
+    const struct estimate distance = odometry_estimate(odometry, frame, odometry->asked_m, odometry_asked_distance(frame),
+                                                       orders->distance, orders->way);
+    const struct estimate angle =
+        odometry_estimate(odometry, frame, odometry->asked_rad, odometry_asked_angle(odometry, frame), orders->angle,
+                          orders->turn);
+    odometry->missed_m = distance.motion;
+    odometry->missed_rad = angle.motion;
+    step->distance += frames * distance.motion;
+    step->angle += frames * angle.motion;
+    step->loose_distance = hypot(step->loose_distance, frames * distance.sigma);
+    step->loose_angle = hypot(step->loose_angle, frames * angle.sigma);
+    odometry->estimated += (uint64_t)frames;
 }
 
 static struct odometry_units odometry_units(double distance_m, double angle_rad)
 {
     return (struct odometry_units){distance_m / DISTANCE_UNIT_M, angle_rad / ANGLE_UNIT_RAD};
+}
+
+/* The way of the wheel that went further, m. */
+static double odometry_wheel_way(const struct create_odometry *odometry, double distance, double angle)
+{
+    return fabs(distance) + fabs(angle) * odometry->settings.wheel_base_m / 2;
+}
+
+/* Holds what a frame says against what wheels can do in its time. Nothing is left out: it is believed, in doubt, or
+ * replaced and counted. */
+static void odometry_bound(struct create_odometry *odometry, struct create_step *step, const struct create_frame *frame)
+{
+    const double time_s = (frame->missed + 1) * PERIOD_S + HELD_S;
+    const double asked_m = fmax(odometry_wheel_way(odometry, odometry->asked_m, odometry->asked_rad),
+                                odometry_wheel_way(odometry, odometry_asked_distance(frame),
+                                                   odometry_asked_angle(odometry, frame)));
+    const double driven_m = DRIVEN * SPEED_MAX_M_S * time_s;
+    const double most_m = PUSHED_M_S * fmin(time_s, PUSHED_MOST_S) +
+                          DRIVEN * fmin(asked_m / PERIOD_S, SPEED_MAX_M_S) * time_s;
+    const double way_m = odometry_wheel_way(odometry, step->distance, step->angle);
+    if (way_m > most_m) {
+        odometry->carried++;
+        *step = (struct create_step){.loose_distance = driven_m, .loose_angle = driven_m / odometry->settings.wheel_base_m};
+        odometry_add_estimate(odometry, step, 1, frame);
+    } else if (way_m > driven_m || frame->timing == CREATE_SURPLUS) {
+        step->loose_distance = fabs(step->distance);
+        step->loose_angle = fabs(step->angle);
+    }
 }
 
 static struct create_step odometry_step_by_encoders(struct create_odometry *odometry, const struct create_frame *frame)
@@ -172,16 +249,20 @@ static struct create_step odometry_step_by_encoders(struct create_odometry *odom
     const double count_m = create_model_facts(settings->model)->count_m;
     double left, right;
     if (!odometry_count_wheels(odometry, frame, &left, &right)) {
-        struct create_step step = {0};
-        odometry_add_estimate(odometry, &step, frame);
-        return step;
+        return (struct create_step){0};
     }
     /* Two wheels, each known to a count: their mean and difference are worth these units. */
     const struct reading distance = {(right + left) / 2 * settings->distance_scale, settings->relative_sigma,
-                                     count_m / sqrt(2)};
+                                     0, count_m / sqrt(2)};
     const struct reading angle = {(right - left) / settings->wheel_base_m * settings->angle_scale,
-                                  settings->relative_sigma, count_m * sqrt(2) / settings->wheel_base_m};
-    return odometry_step_of(odometry, distance, angle);
+                                  settings->relative_sigma, 0, count_m * sqrt(2) / settings->wheel_base_m};
+    struct create_step step = odometry_step_of(odometry, distance, angle);
+    const uint64_t carried = odometry->carried;
+    odometry_bound(odometry, &step, frame);
+    if (odometry->carried > carried) {
+        odometry_add_estimate(odometry, &step, frame->missed, frame);
+    }
+    return step;
 }
 
 static struct create_step odometry_step_by_values(struct create_odometry *odometry, const struct create_frame *frame,
@@ -191,12 +272,16 @@ static struct create_step odometry_step_by_values(struct create_odometry *odomet
     const struct odometry_units reported = {frame->value[CREATE_OI_DISTANCE], frame->value[CREATE_OI_ANGLE]};
     standing_watch(odometry, asked, reported, odometry->remainder == CREATE_KEPT);
     remainder_watch(odometry, frame, asked);
-    odometry->distance = odometry_choose(odometry, asked.distance);
-    odometry->angle = odometry_choose(odometry, asked.angle);
+    odometry->distance = odometry_choose(odometry, asked.distance, reported.distance);
+    odometry->angle = odometry_choose(odometry, asked.angle, reported.angle);
     struct create_step step =
         odometry_step_of(odometry, odometry_read_distance(odometry, frame, d), odometry_read_angle(odometry, frame, a));
-    if (frame->missed > 0) {
-        odometry_add_estimate(odometry, &step, frame);
+    odometry_bound(odometry, &step, frame);
+    if (frame->timing == CREATE_LATE) { /* here it is, and what it was thought to be worth is taken back */
+        step.distance -= odometry->missed_m;
+        step.angle -= odometry->missed_rad;
+    } else {
+        odometry_add_estimate(odometry, &step, frame->missed, frame);
     }
     return step;
 }

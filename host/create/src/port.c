@@ -3,8 +3,11 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
+
+#include "create/command.h"
 
 static const struct {
     uint32_t baud;
@@ -51,13 +54,20 @@ int create_port_open(const char *path, uint32_t baud)
         return -1;
     }
     const int port = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (port >= 0 && (flock(port, LOCK_EX | LOCK_NB) != 0 || !port_make_raw(port, speed))) {
+    if (port >= 0 && (flock(port, LOCK_EX | LOCK_NB) != 0 || !port_make_raw(port, speed) || ioctl(port, TIOCEXCL) != 0)) {
         const int error = errno;
         close(port);
         errno = error;
         return -1;
     }
     return port;
+}
+
+/* A pseudo-terminal stays closed to others for as long as its far end lives, if nobody opens it to them. */
+void create_port_close(int port)
+{
+    ioctl(port, TIOCNXCL);
+    close(port);
 }
 
 int create_port_read(int port, uint8_t *bytes, size_t room)
@@ -73,15 +83,36 @@ int create_port_read(int port, uint8_t *bytes, size_t room)
     return -1;
 }
 
-bool create_port_write(int port, const uint8_t *bytes, size_t count)
+void create_port_forget(int port)
 {
-    while (count > 0) {
-        const ssize_t sent = write(port, bytes, count);
-        if (sent < 0 && errno != EINTR) {
-            return false;
-        }
-        bytes += sent > 0 ? sent : 0;
-        count -= sent > 0 ? (size_t)sent : 0;
+    tcflush(port, TCIFLUSH);
+}
+
+int create_port_write(int port, const uint8_t *bytes, size_t count)
+{
+    const ssize_t sent = write(port, bytes, count);
+    return sent >= 0 ? (int)sent : errno == EAGAIN || errno == EINTR ? 0 : -1;
+}
+
+size_t create_port_waiting(int port)
+{
+    int count;
+    return ioctl(port, TIOCOUTQ, &count) == 0 && count > 0 ? (size_t)count : 0;
+}
+
+/* What waits is at most an order when its writer paces itself: then the stop is behind it in a millisecond, and nothing
+ * is cut. */
+bool create_port_stop(int port)
+{
+    uint8_t bytes[CREATE_COMMAND_BYTES];
+    const size_t count = create_put_stop(bytes);
+    if (create_port_waiting(port) > count) {
+        tcflush(port, TCOFLUSH);
     }
-    return true;
+    const int written = create_port_write(port, bytes, count);
+    if (written >= 0 && (size_t)written < count) {
+        tcflush(port, TCOFLUSH);
+        return create_port_write(port, bytes, count) == (int)count;
+    }
+    return written == (int)count;
 }

@@ -99,7 +99,6 @@ static void stream_take(struct create_stream *stream, struct create_frame *frame
 {
     const uint64_t lost = stream->counts.skipped - stream->skipped_before;
     stream_read_packets(stream, frame);
-    frame->ordered = 0;
     frame->missed = stream->seen ? (uint32_t)((lost + stream->length / 2) / stream->length) : 0;
     stream->counts.frames++;
     stream->counts.resyncs += stream->seen && !stream->synchronised;

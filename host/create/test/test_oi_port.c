@@ -9,6 +9,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -51,7 +52,7 @@ static void every_byte_passes(void **state)
         sent[i] = (uint8_t)i;
     }
     assert_int_equal(create_port_read(port, got, ALL), 0); /* nothing has come: at once */
-    assert_true(create_port_write(port, sent, ALL));
+    assert_int_equal(create_port_write(port, sent, ALL), ALL);
     read_all(base, got, ALL);
     assert_memory_equal(got, sent, ALL);
     assert_int_equal(write(base, sent, ALL), ALL);
@@ -101,7 +102,10 @@ static void what_is_no_free_line_is_refused(void **state)
     const int base = make_line(&path), port = create_port_open(path, 57600);
     assert_int_equal(create_port_open(path, 57600), -1);
     assert_int_equal(errno, EWOULDBLOCK);
-    close(port);
+    int alone = 0;
+    assert_int_equal(ioctl(port, TIOCGEXCL, &alone), 0);
+    assert_true(alone); /* nor may anybody else open it, but the superuser */
+    create_port_close(port);
     const int again = create_port_open(path, 57600);
     assert_true(again >= 0);
     close(again);
@@ -112,6 +116,26 @@ static void what_is_no_free_line_is_refused(void **state)
     assert_int_equal(errno, ENOENT);
 }
 
+/* A line that nobody empties takes what it has room for, and a stop when there is room again. */
+static void a_full_line_takes_a_stop_as_soon_as_it_can(void **state)
+{
+    (void)state;
+    const char *path;
+    const int base = make_line(&path), port = create_port_open(path, 57600);
+    uint8_t bytes[4096] = {0};
+    int taken = 0, more;
+    while ((more = create_port_write(port, bytes, sizeof bytes)) > 0) {
+        taken += more;
+    }
+    assert_int_equal(more, 0);
+    tcflush(base, TCIFLUSH); /* the base has them */
+    while (!create_port_stop(port)) {
+        assert_true(read(base, bytes, sizeof bytes) > 0);
+    }
+    close(port);
+    close(base);
+}
+
 static void a_line_that_goes_is_noticed(void **state)
 {
     (void)state;
@@ -120,7 +144,8 @@ static void a_line_that_goes_is_noticed(void **state)
     uint8_t byte = 0;
     close(base);
     assert_int_equal(create_port_read(port, &byte, 1), -1);
-    assert_false(create_port_write(port, &byte, 1));
+    assert_int_equal(create_port_write(port, &byte, 1), -1);
+    assert_false(create_port_stop(port));
     close(port);
 }
 
@@ -129,7 +154,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_byte_passes),           cmocka_unit_test(the_baud_is_set),
         cmocka_unit_test(no_modem_wire_is_waited_for), cmocka_unit_test(what_is_no_free_line_is_refused),
-        cmocka_unit_test(a_line_that_goes_is_noticed),
+        cmocka_unit_test(a_full_line_takes_a_stop_as_soon_as_it_can), cmocka_unit_test(a_line_that_goes_is_noticed),
     };
     return cmocka_run_group_tests_name("port", tests, NULL, NULL);
 }

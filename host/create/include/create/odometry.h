@@ -5,6 +5,10 @@
  * unit for the next time, some drop it: then the body whisk (pi/24 rad/s, 0.11 degrees per frame of 15 ms) reads as no
  * turn at all. Where that is possible the speeds that the base was asked for are integrated instead. Create 2 has
  * encoders. The policy says which source counts. Pure: no allocation, no I/O.
+ *
+ * One bound holds for all sources: wheels that turned faster than a base can drive were pushed, and their motion is in
+ * doubt by its own size; what no wheel can have done is no motion: what was asked for is taken instead, and the frame
+ * counts as carried.
  */
 #ifndef CREATE_ODOMETRY_H
 #define CREATE_ODOMETRY_H
@@ -61,11 +65,13 @@ struct create_odometry {
     enum create_remainder remainder;    /* what this firmware has been seen to do */
     enum create_source distance, angle; /* in force at the newest frame */
     uint64_t estimated;                 /* frames that never came, whose motion was estimated */
+    uint64_t carried;                   /* frames that said what no wheel can have done: moved by hand, or a lie */
     struct create_evidence evidence;    /* about the remainder */
     enum create_standing standing;
     double missing; /* units that should have been reported and were not */
     bool started;
-    double asked_m, asked_rad; /* motion asked for in the newest frame */
+    double asked_m, asked_rad;   /* motion asked for in the newest frame */
+    double missed_m, missed_rad; /* each of the frames missed last was thought to be worth */
     int32_t left, right;       /* encoders at the newest frame */
 };
 

@@ -14,17 +14,30 @@ extern "C" {
 /* Whether the interface knows this baud (opcode 129), so that this library can set it. */
 bool create_port_knows(uint32_t baud);
 
-/* Opens the terminal at `path`: 8N1, raw, no flow control, locked against a second driver, pending bytes thrown away.
- * Returns its descriptor, or -1 with errno: EWOULDBLOCK if another process has it locked, ENOTTY if it is no terminal.
- */
+/* Opens the terminal at `path`: 8N1, raw, no flow control, for this process alone, pending bytes thrown away. Returns
+ * its descriptor, or -1 with errno: EWOULDBLOCK if another driver has it locked, EBUSY if another process has it for
+ * itself, ENOTTY if it is no terminal. */
 int create_port_open(const char *path, uint32_t baud);
+
+/* Lets others open the terminal again, and closes it. */
+void create_port_close(int port);
 
 /* Reads what has come, at most `room` bytes. Returns how many, 0 if there are none now, -1 with errno if the line is
  * gone. */
 int create_port_read(int port, uint8_t *bytes, size_t room);
 
-/* Writes all bytes, or fails: false with errno if the line is gone or takes nothing. */
-bool create_port_write(int port, const uint8_t *bytes, size_t count);
+/* Throws away what has come and was not read. */
+void create_port_forget(int port);
+
+/* Writes as many of the bytes as there is room for now: how many, -1 with errno if the line is gone. */
+int create_port_write(int port, const uint8_t *bytes, size_t count);
+
+/* Bytes written that have not left, as far as the system says. */
+size_t create_port_waiting(int port);
+
+/* Stops the wheels: what has not left is thrown away if it is in the way, and what was cut by that ends in zero bytes.
+ * False: it was not written whole. Try again. */
+bool create_port_stop(int port);
 
 #pragma GCC visibility pop
 #ifdef __cplusplus

@@ -22,12 +22,27 @@ extern "C" {
 
 #define CREATE_STREAM_BYTES 256 /* more than the longest frame */
 
+/* How a frame fits the clock. The stream says CREATE_IN_TIME; a caller that has a clock sets it. */
+enum create_timing {
+    CREATE_IN_TIME,
+    CREATE_LATE,   /* it was counted as missed before */
+    CREATE_SURPLUS /* there is no time that it could be of: said twice, or made up */
+};
+
+/* What a base does in some time if it hears each order at once: its motion, and the way, whatever the direction. */
+struct create_ordered {
+    bool changed;                      /* other speeds were ordered meanwhile */
+    bool heard;                        /* the base says that it was asked for the last of them */
+    double distance, angle, way, turn; /* m, rad */
+};
+
 /* The newest values of the packets asked for, by packet id; the others are 0. Units: protocol/create_oi.h. */
 struct create_frame {
     int32_t value[CREATE_OI_PACKET_MAX + 1];
-    uint32_t missed;  /* frames that should have come since the one before, judged by the bytes skipped */
-    uint32_t ordered; /* the last so many of them came after other speeds had been ordered; the caller that orders
-                         speeds sets it */
+    enum create_timing timing;
+    uint32_t missed;  /* frames that should have come since the one before, judged by the bytes skipped; a caller that has
+                         a clock judges anew */
+    struct create_ordered ordered; /* since the frame before; a caller that orders speeds sets it */
 };
 
 struct create_stream_counts {

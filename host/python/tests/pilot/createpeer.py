@@ -1,9 +1,13 @@
-"""A base for tests: the far end of whisker-base's serial line, scripted, and the daemon on it. Nothing here sleeps."""
+"""A base for tests: the far end of whisker-base's serial line, scripted, and the daemon on it."""
 
+import fcntl
 import os
 import pty
+import select
 import signal
+import struct
 import subprocess
+import termios
 import threading
 import tty
 from pathlib import Path
@@ -24,54 +28,114 @@ def drive_order(left_mm_s: int, right_mm_s: int) -> bytes:
 
 
 class Peer:
-    """A pseudo terminal whose slave is linked at `link`; keeps what the driver has written."""
+    """A pseudo terminal whose slave is linked at `link`; keeps what the driver has written, and says what it was asked for."""
+
+    PERIOD_S = 0.015
 
     def __init__(self, link: Path):
         self.link = link
-        self.heard = b""
         self.asked: list[int] = []  # packets of the stream
-        self.reported = 0  # bytes written to the driver
+        self._lock, self._silent, self._teller = threading.RLock(), threading.Event(), None
         self._open()
 
     def _open(self) -> None:
+        self.heard = b""
+        self.reported = 0  # bytes written to the driver
+        self._orders, self._requested = b"", (0, 0)  # heard and not yet read; speeds right and left
         self.master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         self.link.symlink_to(os.ttyname(self._slave))
 
     def vanish(self) -> None:
         """As when the cable is pulled: the driver's end is hung up and its path is gone."""
+        self.fall_silent()
         self.link.unlink()
         os.close(self._slave)
         os.close(self.master)
-        self.heard = b""
-        self.reported = 0
 
     def come_back(self) -> None:
         self._open()
 
     def close(self) -> None:
+        self.fall_silent()
         os.close(self._slave)
         os.close(self.master)
 
+    def free(self) -> None:
+        """Lets others open it, as a serial port does when all that had it open are killed."""
+        fcntl.ioctl(self._slave, termios.TIOCNXCL)
+
+    def keep_telling(self, **values: int) -> None:
+        """Tells a frame every 15 ms from now on, until fall_silent()."""
+        self.fall_silent()
+        self._silent.clear()
+        self._teller = threading.Thread(target=self._tell_on, kwargs=values, daemon=True)
+        self._teller.start()
+
+    def _tell_on(self, **values: int) -> None:
+        while not self._silent.wait(self.PERIOD_S):
+            self.tell(self.frame(**values))
+
+    def fall_silent(self) -> None:
+        self._silent.set()
+        if self._teller:
+            self._teller.join()
+
+    def _listen(self, wait_s: float = 0) -> None:
+        """Takes what has come; meanwhile frames go on."""
+        select.select([self.master], [], [], wait_s)
+        with self._lock:
+            while select.select([self.master], [], [], 0)[0]:
+                data = os.read(self.master, 4096)
+                self.heard += data
+                self._obey(data)
+
+    def _obey(self, data: bytes) -> None:
+        """Reads whole orders for what they ask of the wheels."""
+        self._orders += data
+        while self._orders:
+            order = self._orders[0]
+            length = {DRIVE: 5, PAUSE: 2, STREAM: 2 + (self._orders[1:2] or b"\0")[0]}.get(order, 1)
+            if len(self._orders) < length or (order == STREAM and len(self._orders) < 2):
+                return
+            if order == DRIVE:
+                self._requested = struct.unpack(">hh", self._orders[1:5])
+            self._orders = self._orders[length:]
+
     def await_order(self, order: bytes) -> bytes:
         """Waits until the driver has written these bytes; returns what came before them and forgets up to their end."""
-        while order not in self.heard:
-            self.heard += os.read(self.master, 4096)
-        before, _, self.heard = self.heard.partition(order)
+        while True:
+            with self._lock:
+                if order in self.heard:
+                    before, _, self.heard = self.heard.partition(order)
+                    return before
+            self._listen(self.PERIOD_S)
+
+    def await_start(self) -> bytes:
+        """Waits for stop, passive and the list of packets, which it remembers."""
+        before = self.await_order(bytes([START, STREAM]))
+        count = self.await_bytes(1)[0]
+        self.asked = list(self.await_bytes(count))
         return before
 
-    def await_start(self, mode: int = SAFE) -> bytes:
-        """Waits for stop, mode and the list of packets, which it remembers."""
-        before = self.await_order(bytes([START, mode, STREAM]))
-        while len(self.heard) < 1 or len(self.heard) < 1 + self.heard[0]:
-            self.heard += os.read(self.master, 4096)
-        count = self.heard[0]
-        self.asked, self.heard = list(self.heard[1 : 1 + count]), self.heard[1 + count :]
-        return before
+    def await_bytes(self, count: int) -> bytes:
+        while len(self.heard) < count:
+            self._listen(self.PERIOD_S)
+        with self._lock:
+            data, self.heard = self.heard[:count], self.heard[count:]
+        return data
+
+    def enter(self, mode: int = SAFE) -> None:
+        """Says that it rests, waits for the mode, and says that it is in it."""
+        self.tell(self.frame(p35=PASSIVE_MODE))
+        self.await_order(bytes([mode]))
+        self.tell(self.frame(p35=SAFE_MODE if mode == SAFE else FULL_MODE))
 
     def frame(self, **values: int) -> bytes:
         """A frame of what was asked for; p35=2: packet 35 is 2. The rest is a healthy base that stands."""
-        value = {**HEALTHY, **{int(name[1:]): number for name, number in values.items()}}
+        self._listen()
+        requested = dict(zip((41, 42), self._requested, strict=True))
+        value = {**HEALTHY, **requested, **{int(name[1:]): number for name, number in values.items()}}
         data = b"".join(
             bytes([packet]) + (value.get(packet, 0) & (256 ** SIZES[packet] - 1)).to_bytes(SIZES[packet], "big")
             for packet in self.asked
@@ -81,9 +145,10 @@ class Peer:
 
     def tell(self, data: bytes) -> int:
         """Writes to the driver; returns the bytes written in all."""
-        os.write(self.master, data)
-        self.reported += len(data)
-        return self.reported
+        with self._lock:
+            os.write(self.master, data)
+            self.reported += len(data)
+            return self.reported
 
 
 class Heart:
@@ -132,6 +197,7 @@ class Driver:
         self.start()
 
     def start(self) -> None:
+        self.peer.free()
         words = [program("whisker-base"), "--port", self.peer.link, "--socket", self.socket, *self._options]
         with self.log.open("w") as log:
             self.process = subprocess.Popen(
@@ -144,6 +210,13 @@ class Driver:
 
     def client(self) -> Base:
         return Base(str(self.socket))
+
+    def enter(self, mode: int = SAFE) -> None:
+        """The base enters its mode, and the driver knows."""
+        self.peer.enter(mode)
+        with self.client() as client:
+            while client.health()["mode"] != ("safe" if mode == SAFE else "full"):
+                pass
 
     def end(self, number: int = signal.SIGTERM) -> int:
         self.process.send_signal(number)

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from createpeer import FIRM_STOP, FULL, PAUSE, SAFE, START, STOP, STREAM, Driver, Heart, drive_order
+from createpeer import FIRM_STOP, FULL, FULL_MODE, PAUSE, SAFE, SAFE_MODE, START, STOP, STREAM, Driver, Heart, drive_order
 from hostile_clients import attacked, serve_honest
 
 from crunchbot.pilot import base
@@ -25,13 +25,16 @@ ENDED = STOP + bytes([PAUSE, 0, START])  # last words: stopped, silent, passive
 
 @pytest.fixture
 def start(tmp_path):
-    """Starts whisker-base with options; it is up to date with its base when this returns."""
+    """Starts whisker-base with options; the base has entered its mode when this returns."""
     drivers = []
 
     def begin(*options, mode=SAFE, **more):
         driver = Driver(tmp_path, *options, **more)
         drivers.append(driver)
-        assert driver.peer.await_start(mode).endswith(STOP)
+        assert driver.peer.await_start().endswith(STOP)
+        driver.enter(mode)
+        if "stream" not in options:
+            driver.peer.keep_telling(p35=SAFE_MODE if mode == SAFE else FULL_MODE)
         return driver
 
     yield begin
@@ -60,7 +63,7 @@ def test_starts_stopped_and_ends_stopped_passive_and_gone(start):
 
 def test_create_2_is_asked_for_encoders_and_full_mode_is_entered(start):
     driver = start("--model", "2", "--mode", "full", mode=FULL)
-    assert driver.peer.asked[-2:] == [43, 44]
+    assert {43, 44} <= set(driver.peer.asked)
 
 
 def test_drive_says_what_the_wheels_really_do(start):
@@ -80,7 +83,7 @@ def test_odometry_is_of_the_frames_up_to_a_byte_and_of_each_client(start):
     driver = start("--clock", "stream", "--odometry", "reported")
     peer = driver.peer
     with driver.client() as client, driver.client() as other:
-        assert client.odometry(after=0).bits & base.IDLE  # no frame has come
+        assert client.odometry(after=0).bits == 0
         one = peer.tell(peer.frame(p19=20))
         two = peer.tell(peer.frame(p19=30, p7=base.BUMP_LEFT, p9=1))
         first = client.odometry(after=one)
@@ -90,10 +93,10 @@ def test_odometry_is_of_the_frames_up_to_a_byte_and_of_each_client(start):
         assert second.x_m == 0.03
         assert second.bits == base.BUMP_LEFT | base.CLIFF_LEFT
         assert other.odometry().x_m == pytest.approx(0.05)
-        peer.tell(peer.frame(p20=90))
+        peer.tell(peer.frame(p20=5))
         third = client.odometry(after=peer.reported)
-        assert third.theta_rad == pytest.approx(math.pi / 2)
-        assert client.health()["frames"] == "3"
+        assert third.theta_rad == pytest.approx(math.radians(5))
+        assert client.health()["frames"] == "5"  # two before it was in its mode
 
 
 def test_nothing_is_taken_beyond_what_a_client_asks_for(start):
@@ -117,7 +120,7 @@ def test_damaged_bytes_cost_one_frame_and_are_counted(start):
         client.odometry(after=peer.reported)
         health = client.health()
     assert {key: health[key] for key in ("frames", "corrupt", "skipped", "resyncs", "missed")} == {
-        "frames": "2",
+        "frames": "4",
         "corrupt": "1",
         "skipped": str(len(frame) - 1),
         "resyncs": "1",
@@ -181,6 +184,7 @@ def test_a_killed_driver_stops_the_wheels_and_another_takes_over(start):
         os.kill(int(client.health()["driver_pid"]), signal.SIGKILL)
         assert driver.peer.await_order(FIRM_STOP) == b""  # the guard's
         assert driver.peer.await_start() == FIRM_STOP  # the next driver's
+        driver.enter()
         with pytest.raises(BaseLost):
             client.health()
     with driver.client() as client:
@@ -193,7 +197,6 @@ def test_a_driver_that_hangs_is_replaced(start):
     driver = start()
     with driver.client() as client:
         pid = int(client.health()["driver_pid"])
-        await_frame(client, driver)  # the line is not silent for half a second to come
         client.drive(0.2, 0)
         driver.peer.await_order(drive_order(200, 200))
         os.kill(pid, signal.SIGSTOP)
@@ -209,7 +212,7 @@ def test_a_killed_guard_stops_the_wheels_and_ends_the_driver(start):
         client.drive(0.2, 0)
         driver.peer.await_order(drive_order(200, 200))
         assert driver.end(signal.SIGKILL) == -signal.SIGKILL
-        assert driver.peer.await_order(ENDED) == b""
+        assert driver.peer.await_order(ENDED) == STOP
         with pytest.raises(BaseLost):
             client.health()
     driver.start()  # what was left behind is no hindrance
@@ -350,34 +353,66 @@ def test_a_service_manager_that_hangs_is_no_hindrance(start, manager):
 
 def test_a_base_that_leaves_its_mode_waits_for_its_commander(start):
     driver = start("--clock", "stream")
+    peer = driver.peer
     with driver.client() as client:
         client.drive(0.2, 0)
         await_frame(client, driver)
         assert client.odometry().bits == 0
+        peer.await_order(drive_order(200, 200))
         await_frame(client, driver, p35=1, p10=1)
         health = client.health()
         assert (health["mode"], health["mode_losses"], health["left_mm_s"]) == ("passive", "1", "0")
         assert client.odometry().bits == base.IDLE | base.CLIFF_FRONT_LEFT
-        driver.peer.await_order(drive_order(200, 200))
+        assert client.drive(0.2, 0).v_m_s == 0
+        peer.tell(peer.frame(p35=1) * 100)
+        client.odometry(after=peer.reported)
         client.mode("safe")
-        assert driver.peer.await_order(STOP + bytes([SAFE])) == b""  # nothing was sent before it was asked for
+        assert peer.await_start() == 2 * STOP + STOP + FIRM_STOP  # it was asked for nothing before that
+        await_frame(client, driver, p35=1)
+        peer.await_order(bytes([SAFE]))
+        assert client.health()["mode"] == "passive"
         await_frame(client, driver)
         assert client.health()["mode"] == "safe"
     assert "has left its mode: a cliff" in driver.log.read_text()
 
 
-def test_a_firmware_that_reports_modes_one_too_high_is_understood(start):
-    driver = start("--clock", "stream")
+def test_a_firmware_that_reports_modes_one_too_high_is_understood(tmp_path):
+    driver = Driver(tmp_path, "--clock", "stream")
     peer = driver.peer
+    peer.await_start()
     with driver.client() as client:
-        peer.tell(peer.frame(p35=3) * 19)
-        assert client.odometry(after=peer.reported).bits == base.IDLE
-        peer.tell(peer.frame(p35=3))
-        client.odometry(after=peer.reported)
+        for times in range(4):  # asked to rest, again and again
+            if times:
+                peer.await_start()
+            assert client.health()["mode"] == "unknown"
+            peer.tell(peer.frame(p35=2) * 5)
+            client.odometry(after=peer.reported)
+            assert client.odometry().bits & base.IDLE
+        assert client.health()["mode"] == "passive"
+        peer.await_order(bytes([SAFE]))
+        await_frame(client, driver, p35=3)
         assert client.health()["mode"] == "safe"
-        assert client.odometry().bits == 0
+        assert not client.odometry().bits & base.IDLE
         await_frame(client, driver, p35=2)
         assert client.health()["mode_losses"] == "1"
+    driver.close()
+
+
+def test_a_mode_lasts_as_long_as_its_commander(start):
+    driver = start("--clock", "stream")
+    peer = driver.peer
+    with driver.client() as observer:
+        with driver.client() as commander:
+            commander.mode("full")
+            peer.await_start()
+            commander.odometry(after=peer.tell(peer.frame(p35=1)))
+            peer.await_order(bytes([FULL]))
+            commander.odometry(after=peer.tell(peer.frame(p35=3)))
+            assert commander.health()["mode"] == "full"
+        peer.await_start()
+        observer.odometry(after=peer.tell(peer.frame(p35=1)))
+        peer.await_order(bytes([SAFE]))
+        assert observer.health()["wanted_mode"] == "safe"
 
 
 def test_a_line_that_goes_and_comes_back(start):
@@ -390,6 +425,10 @@ def test_a_line_that_goes_and_comes_back(start):
         assert driver.peer.await_start().endswith(STOP)
         health = client.health()
         assert (health["reconnects"], health["port"], health["left_mm_s"]) == ("1", "open", "0")
+        assert (health["mode"], health["voltage_mv"], health["orders"]) == ("unknown",) * 3  # of another connection
+        assert client.drive(0.1, 0).v_m_s == 0
+        driver.enter()
+        driver.peer.keep_telling()
         client.drive(0.1, 0)
         driver.peer.await_order(drive_order(100, 100))
     assert driver.log.read_text().count("plug it in again") == 1
@@ -412,31 +451,39 @@ def test_without_a_line_orders_say_so(start):
 def test_a_silent_line_is_asked_for_its_stream_again(start):
     driver = start()
     with driver.client() as client:
-        await_frame(client, driver)
+        driver.peer.fall_silent()
         before = client.health()["silences"]
         while client.health()["silences"] == before:
             assert driver.peer.await_start().endswith(STOP)
         await_frame(client, driver)
-        assert int(client.health()["missed"]) >= 500 // 15 - 1
+        assert int(client.health()["missed"]) >= 450 // 15 - 1
 
 
 def test_wheels_are_not_driven_blind(start):
     driver = start()
     with driver.client() as client:
-        await_frame(client, driver)
+        driver.peer.fall_silent()
         while client.health()["silences"] == "0":
             assert driver.peer.await_start().endswith(STOP)
         sent = client.drive(0.2, 0)
         assert (sent.v_m_s, sent.omega_rad_s) == (0, 0)
         assert client.odometry().bits & base.IDLE
-        await_frame(client, driver)
+        driver.enter()
+        client.odometry()
         assert not client.odometry().bits & base.IDLE
 
 
 def test_a_silent_line_is_not_put_back_into_a_mode_that_it_left(start):
     driver = start()
-    driver.peer.tell(driver.peer.frame() + driver.peer.frame(p35=1, p9=1))
-    assert driver.peer.await_order(bytes([START, STREAM])).endswith(STOP)
+    peer = driver.peer
+    peer.fall_silent()
+    peer.tell(peer.frame(p35=1, p9=1))
+    assert peer.await_start().endswith(STOP)
+    with driver.client() as client:
+        peer.tell(peer.frame(p35=1))
+        while client.health()["mode"] != "passive":
+            pass
+        assert SAFE not in peer.heard
 
 
 def test_a_low_battery_is_reported_once(start):
@@ -584,7 +631,7 @@ def test_wrong_use_is_reported_in_one_line(tmp_path):
         code, text = refused("--port", port, "--socket", socket)
         assert (code, expected in text) == (1, True), text
     code, text = refused("--port", "/dev/null", "--socket", "/nowhere/s")
-    assert (code, "choose a path that can be written" in text) == (1, True), text
+    assert (code, "in a folder that can be written" in text) == (1, True), text
 
 
 def test_two_drivers_do_not_share_a_base(start, tmp_path):
@@ -593,6 +640,89 @@ def test_two_drivers_do_not_share_a_base(start, tmp_path):
     assert (code, "another process drives it" in text) == (1, True), text
     code, text = refused("--port", driver.peer.link, "--socket", driver.socket)
     assert (code, "stop the whisker-base that has it" in text) == (1, True), text
+
+
+def test_a_socket_is_made_where_nothing_else_is(start, tmp_path):
+    """A file, a folder, somebody's socket and somebody's lock stay as they are."""
+    data, folder, taken = tmp_path / "data", tmp_path / "folder", tmp_path / "taken"
+    data.write_text("a year of measurements")
+    folder.mkdir()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as other:
+        other.bind(str(taken))
+        other.listen()
+        for path in (data, folder, taken):
+            code, text = refused("--port", "/dev/null", "--socket", path)
+            assert (code, "choose a path where nothing is" in text) == (1, True), text
+            assert not Path(f"{path}.lock").exists()
+        assert data.read_text() == "a year of measurements" and taken.is_socket()
+    (tmp_path / "s.lock").write_text("of another program")
+    code, text = refused("--port", "/dev/null", "--socket", tmp_path / "s")
+    assert (code, "s.lock: File exists" in text) == (1, True), text
+    assert (tmp_path / "s.lock").read_text() == "of another program"
+
+
+def test_at_the_end_only_its_own_socket_is_removed(start):
+    driver = start()
+    driver.socket.unlink()
+    driver.socket.write_text("of somebody else")
+    assert driver.end() == 0
+    assert driver.socket.read_text() == "of somebody else"
+    assert not Path(f"{driver.socket}.lock").exists()
+
+
+def test_a_whisker_base_that_hangs_keeps_its_socket(start, tmp_path):
+    """Also with as many that wait to be taken as there is room for."""
+    driver = start("--clock", "stream")
+    with driver.client() as client:
+        pid = int(client.health()["driver_pid"])
+        driver.process.send_signal(signal.SIGSTOP)
+        os.kill(pid, signal.SIGSTOP)
+        waiting = []
+        with pytest.raises(BlockingIOError):
+            while True:
+                waiting.append(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK))
+                waiting[-1].connect(str(driver.socket))
+        code, text = refused("--port", "/dev/null", "--socket", driver.socket)
+        assert (code, "stop the whisker-base that has it" in text) == (1, True), text
+        for one in waiting:
+            one.close()
+        os.kill(pid, signal.SIGCONT)
+        driver.process.send_signal(signal.SIGCONT)
+        assert client.health()["restarts"] == "0"
+
+
+def test_without_a_stop_it_says_that_the_wheels_may_turn(start):
+    driver = start("--clock", "stream")
+    with driver.client() as client:
+        client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
+        driver.peer.vanish()
+        while client.health()["port"] == "open":
+            pass
+        assert driver.end() == 1
+    assert "no stop could be written: the wheels may turn" in driver.log.read_text()
+    driver.peer.come_back()
+
+
+def test_why_a_base_is_silent(start, tmp_path):
+    """One sentence a cause, by what comes instead of frames."""
+    garbage = bytes(range(160, 250)) * 20
+    for number, (options, data, cause) in enumerate(
+        (
+            ((), b"", "nothing comes: it is off or asleep"),
+            ((), b"\r\nbattery 14200 mV\r\n" * 9, "it sends text"),
+            ((), b"\xfe" * 99, "its boot loader starts again and again"),
+            ((), garbage, "what comes is no frame; check --baud"),
+            (("--model", "2"), bytes([19, 35]) * 9, "it sends what the other model would"),
+            ((), bytes([19, 35]) * 9, "it does not hear; check the wire to it"),
+        )
+    ):
+        (tmp_path / str(number)).mkdir()
+        driver = Driver(tmp_path / str(number), *options)
+        driver.peer.await_start()
+        driver.peer.tell(data)
+        await_log(driver, cause)
+        driver.close()
 
 
 def test_help_has_examples():

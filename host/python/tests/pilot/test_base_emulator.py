@@ -102,6 +102,8 @@ def test_a_create_1_shows_how_it_counts_and_the_whisk_is_seen_either_way(robot, 
 
 def test_a_create_2_whisks_at_the_speed_it_says(robot):
     it = robot("--model", "2", driver=("--model", "2", *FRAME_BY_FRAME))
+    while it.wait_frame().bits & IDLE:
+        pass
     sent = it.base.drive(0, WHISK_RAD_S)
     seen, frames = turning(it, it.drive_until(0, WHISK_RAD_S, turned(0.15)))
     expected = frames * 0.015 * sent.omega_rad_s

@@ -1,6 +1,7 @@
 """`whisker robot`: which processes it starts, by its options."""
 
 import os
+import subprocess
 import socket
 import sys
 import threading
@@ -237,14 +238,18 @@ def test_who_writes_the_ring_is_named(refused, given):
     assert code == 1 and f"by process {os.getpid()} (" in line and "--no-daemon" in line
 
 
-def test_who_has_the_serial_port_is_named(refused, given, tmp_path):
+def test_who_has_the_serial_port_is_named_but_not_its_emulator(refused, given, tmp_path):
     main, held = os.openpty()
     link = tmp_path / "port"
     link.symlink_to(os.ttyname(held))
-    code, line = refused(*given, "--port", link)
+    assert holders.check_serial(link) == ""  # this process is at the other end: so is an emulator
+    with subprocess.Popen(["sleep", "60"], stdin=held) as other:
+        code, line = refused(*given, "--port", link)
+        other.kill()
     os.close(main)
     os.close(held)
-    assert code == 1 and f"by process {os.getpid()} (" in line and "--port" in line
+    assert code == 1 and f"by process {other.pid} (sleep" in line and "--port" in line
+    assert str(os.getpid()) not in line
 
 
 def test_a_port_that_is_not_there_is_said_once(started, capsys, tmp_path):

@@ -48,11 +48,28 @@ def check_serial(port: Path) -> str:
     """HeldError when another process has the base's serial port open; a line about a port that is not there, else empty."""
     if not port.exists():
         return f"{port}: there is no such port yet; plug the adapter in, or look in /dev/serial/by-id for its name"
-    if holders := _holders([str(port.resolve())]):
+    device = port.resolve()
+    if holders := [pid for pid in _holders([str(device)]) if pid not in _far_ends(device)]:
         raise HeldError(
             f"robot: {port}: another process has it open{_reported(holders)}; end that, or choose another with --port"
         )
     return ""
+
+
+def _far_ends(device: Path) -> set[int]:
+    """The processes at the other end of a pseudo-terminal: an emulator of a base keeps its own port open."""
+    if device.parent.name != "pts":
+        return set()
+    masters = [(pid, number) for pid, number, link in _descriptors() if link.endswith("/ptmx")]
+    return {pid for pid, number in masters if device.name in _tty_index(PROC / str(pid) / "fdinfo" / number)}
+
+
+def _tty_index(info: Path) -> list[str]:
+    try:
+        fields = dict(line.split(":", 1) for line in info.read_text().splitlines())
+    except OSError:  # gone
+        return []
+    return fields.get("tty-index", "").split()
 
 
 def _reported(pids: Iterable[int]) -> str:
@@ -82,10 +99,11 @@ def _sockets_at(port: int) -> list[str]:
 def _holders(links: Iterable[str]) -> list[int]:
     """The processes, as far as they can be seen, that have one of these open."""
     wanted = set(links)
-    return sorted({pid for pid, link in _open_files() if link in wanted}) if wanted else []
+    return sorted({pid for pid, _, link in _descriptors() if link in wanted}) if wanted else []
 
 
-def _open_files() -> Iterator[tuple[int, str]]:
+def _descriptors() -> Iterator[tuple[int, str, str]]:
+    """Process, descriptor and what it is of."""
     for folder in PROC.glob("[0-9]*/fd"):
         try:
             descriptors = list(folder.iterdir())
@@ -93,6 +111,6 @@ def _open_files() -> Iterator[tuple[int, str]]:
             continue
         for descriptor in descriptors:
             try:
-                yield int(folder.parent.name), os.readlink(descriptor)
+                yield int(folder.parent.name), descriptor.name, os.readlink(descriptor)
             except OSError:
                 continue
