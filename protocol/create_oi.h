@@ -168,8 +168,8 @@ enum { CREATE_OI_CHARGER_INTERNAL = 1, CREATE_OI_CHARGER_DOCK = 2 };
 #define CREATE_OI_PERIOD_MS 15
 #define CREATE_OI_BITS_PER_BYTE 10 /* on the line: start, 8 data, stop */
 
-/* A robot that rests in passive mode, off its charger, and hears no order for so long switches itself off [2]. Its button
- * or a pulse on its wire BRC wakes it. */
+/* A robot that rests in passive mode, off its charger, and hears no order for so long switches itself off [2]. Its
+ * button or a pulse on its wire BRC wakes it. */
 #define CREATE_OI_SLEEP_S 300
 
 /* What opcode BAUD takes: X(code, baud). The new rate is in force CREATE_OI_BAUD_WAIT_MS later. */

@@ -107,11 +107,11 @@ static int options_add_event(struct sim_create_options *options, const char *nam
     if (options->events == SIM_CREATE_EVENTS_MAX)
         return options_refuse(refusal, name, value, "too many events; at most 16 fit");
     if (!event.stimuli)
-        return options_refuse(
-            refusal, name, value,
-            "give bump, bump-left, bump-right, drop-left, drop-right, drop-caster, cliff-left, "
-            "cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger, silent, mute, deaf, held, restart or "
-            "wake, then @START");
+        return options_refuse(refusal, name, value,
+                              "give bump, bump-left, bump-right, drop-left, drop-right, drop-caster, cliff-left, "
+                              "cliff-front-left, cliff-front-right, cliff-right, virtual-wall, charger, silent, mute, "
+                              "deaf, held, restart or "
+                              "wake, then @START");
     if (value[length] != '@' || !options_read_times(value + length + 1, &event))
         return options_refuse(refusal, name, value,
                               "give seconds after the start, as in bump-left@3s or silent@10+2.5");

@@ -109,7 +109,8 @@ static void sim_create_restart(sim_create *create)
 static void sim_create_report_charge(sim_create *create)
 {
     char text[48];
-    if (create->mode == CREATE_OI_MODE_OFF && create->stimuli & SIM_CREATE_CHARGER && create->ticks % TICKS_PER_S == 0) {
+    if (create->mode == CREATE_OI_MODE_OFF && create->stimuli & SIM_CREATE_CHARGER &&
+        create->ticks % TICKS_PER_S == 0) {
         int count = snprintf(text, sizeof text, "battery %d mV, %d mA\r\n", create_battery_voltage(create),
                              create_battery_current(create));
         create_line_send(&create->line, (const uint8_t *)text, (size_t)count);
@@ -180,12 +181,12 @@ unsigned sim_create_baud(const sim_create *create)
     return create->line.baud;
 }
 
-struct sim_create_places sim_create_places(const sim_create *create)
+struct sim_create_places sim_create_where(const sim_create *create)
 {
     return create->line.places;
 }
 
-bool sim_create_spoil(sim_create *create, const struct sim_create_fault *fault)
+bool sim_create_add_fault(sim_create *create, const struct sim_create_fault *fault)
 {
     struct sim_create_options *options = &create->options;
     if (options->faults == SIM_CREATE_FAULTS_MAX)

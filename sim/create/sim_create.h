@@ -41,7 +41,13 @@ enum sim_create_stimulus {
     SIM_CREATE_SILENT = SIM_CREATE_MUTE | SIM_CREATE_DEAF /* the line is cut */
 };
 
-enum { SIM_CREATE_EVENTS_MAX = 16, SIM_CREATE_FAULTS_MAX = 16, SIM_CREATE_OUT_MAX = 4096, SIM_CREATE_IN_MAX = 4096, SIM_CREATE_TWICE_MAX = 256 };
+enum {
+    SIM_CREATE_EVENTS_MAX = 16,
+    SIM_CREATE_FAULTS_MAX = 16,
+    SIM_CREATE_OUT_MAX = 4096,
+    SIM_CREATE_IN_MAX = 4096,
+    SIM_CREATE_TWICE_MAX = 256
+};
 
 /* A stimulus that comes by itself at a time after the start. */
 struct sim_create_event {
@@ -103,8 +109,8 @@ typedef struct sim_create sim_create;
 sim_create *sim_create_new(const struct sim_create_options *options);
 void sim_create_free(sim_create *create);
 
-/* Bytes from the host, which act at once, or with options.queue in their time. Returns how many had room: all, or with a
- * queue as many as fill it up to SIM_CREATE_IN_MAX. */
+/* Bytes from the host, which act at once, or with options.queue in their time. Returns how many had room: all, or with
+ * a queue as many as fill it up to SIM_CREATE_IN_MAX. */
 size_t sim_create_receive(sim_create *create, const uint8_t *bytes, size_t count);
 
 /* The host's adapter throws away what has not left it, and says how much that is. */
@@ -128,9 +134,9 @@ struct sim_create_places {
 };
 /* What its line goes by: an order may have changed it. */
 unsigned sim_create_baud(const sim_create *create);
-struct sim_create_places sim_create_places(const sim_create *create);
+struct sim_create_places sim_create_where(const sim_create *create);
 
 /* One more fault from now on; false: there are SIM_CREATE_FAULTS_MAX. */
-bool sim_create_spoil(sim_create *create, const struct sim_create_fault *fault);
+bool sim_create_add_fault(sim_create *create, const struct sim_create_fault *fault);
 
 #endif

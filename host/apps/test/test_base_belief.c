@@ -220,7 +220,8 @@ static void a_base_that_was_let_go_rests_until_somebody_commands(void **state)
     assert_int_equal(robot.wanted, CREATE_OI_MODE_SAFE);
 }
 
-/* ----------------------------------------------------------------------------------------------------------- the orders
+/* ----------------------------------------------------------------------------------------------------------- the
+ * orders
  */
 
 static void an_order_that_the_base_does_not_repeat_is_written_again(void **state)
@@ -299,7 +300,8 @@ static void a_stop_is_tried_until_it_is_written(void **state)
     assert_true(base_robot_end(&robot, OPENED_MS + 2 * FRAME_MS + BASE_RETRY_MS));
 }
 
-/* ------------------------------------------------------------------------------------------------------------ the clock
+/* ------------------------------------------------------------------------------------------------------------ the
+ * clock
  */
 
 /* Frames each 15 ms, and a hole in them, whatever the bytes show. */

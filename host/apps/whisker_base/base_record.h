@@ -1,4 +1,5 @@
-/* The base as its driver knows it: what was asked of it, what it has said, and when. Times are CLOCK_MONOTONIC in ms. */
+/* The base as its driver knows it: what was asked of it, what it has said, and when. Times are CLOCK_MONOTONIC in ms.
+ */
 #ifndef BASE_RECORD_H
 #define BASE_RECORD_H
 
@@ -9,8 +10,8 @@
 #include "whisker_base_options.h"
 
 /* A commander silent for so long is taken for gone. A base from which no frame has come for BASE_SILENCE_MS is stopped
- * and asked again: what adapters hold back (16 ms), a machine that is late and the order on the line (7 ms) come to less
- * than what is left of 0.5 s. */
+ * and asked again: what adapters hold back (16 ms), a machine that is late and the order on the line (7 ms) come to
+ * less than what is left of 0.5 s. */
 #define BASE_COMMANDER_MS 300
 #define BASE_SILENCE_MS 450
 #define BASE_REOPEN_MS 50
@@ -63,41 +64,41 @@ struct base_robot {
     int port;      /* -1: none */
     uint64_t sent; /* bytes written to this connection */
     struct create_stream stream;
-    struct create_stream before; /* as the last request that was heard asked for; length 0: none */
+    struct create_stream before;      /* as the last request that was heard asked for; length 0: none */
     struct create_stream_counts past; /* of earlier connections */
     struct create_odometry odometry;
     struct create_frame frame; /* newest of this connection */
     struct base_unframed unframed;
 
-    struct create_speeds speeds;        /* ordered last */
-    struct create_speeds written;       /* by the newest order that the line has taken */
-    bool due;                           /* `speeds` are still to be written */
-    bool firm;                          /* behind zero bytes: the base may have half an order */
-    bool may_turn;                      /* no stop was written since the wheels may have turned */
-    enum create_oi_opcode opcode;       /* still to be written; 0: none */
-    uint8_t cut[CREATE_COMMAND_BYTES];  /* the rest of an order for which there was no room */
+    struct create_speeds speeds;       /* ordered last */
+    struct create_speeds written;      /* by the newest order that the line has taken */
+    bool due;                          /* `speeds` are still to be written */
+    bool firm;                         /* behind zero bytes: the base may have half an order */
+    bool may_turn;                     /* no stop was written since the wheels may have turned */
+    enum create_oi_opcode opcode;      /* still to be written; 0: none */
+    uint8_t cut[CREATE_COMMAND_BYTES]; /* the rest of an order for which there was no room */
     size_t cut_count;
     int64_t written_ms, opcode_ms;
     uint32_t unheard; /* frames that say other speeds than were written */
 
-    unsigned requests;  /* for frames, so far */
+    unsigned requests;         /* for frames, so far */
     unsigned unheard_requests; /* since the newest frame */
-    bool request_due;   /* another is to be written */
-    bool answered;      /* a frame has come that the newest request asked for */
+    bool request_due;          /* another is to be written */
+    bool answered;             /* a frame has come that the newest request asked for */
     enum create_oi_mode wanted;
     enum base_phase phase;
-    uint32_t phase_frames; /* since it began */
-    bool left;             /* it left the mode by itself, and nobody has asked for one since */
-    int32_t mode_offset;   /* some firmwares report a mode one higher than it is */
+    uint32_t phase_frames;  /* since it began */
+    bool left;              /* it left the mode by itself, and nobody has asked for one since */
+    int32_t mode_offset;    /* some firmwares report a mode one higher than it is */
     bool low, reported_low; /* battery */
     bool silent;            /* it was heard, and then no more: until a frame comes the wheels stay stopped */
     unsigned held;          /* bits of enum base_hold: while one is set the wheels stay stopped */
     int64_t drive_ms, opened_ms;
-    int64_t frame_ms;     /* when the newest frame was said, at the latest: what has waited to be read is older */
-    int64_t emptied_ms;   /* when nothing was left to read */
-    double schedule_ms;   /* when it was due, by those that came soonest */
-    uint32_t pending;        /* frames that count as missed by the clock alone: they may come late */
-    int64_t reported_ms;  /* when a silence was logged that still lasts; 0: none does */
+    int64_t frame_ms;    /* when the newest frame was said, at the latest: what has waited to be read is older */
+    int64_t emptied_ms;  /* when nothing was left to read */
+    double schedule_ms;  /* when it was due, by those that came soonest */
+    uint32_t pending;    /* frames that count as missed by the clock alone: they may come late */
+    int64_t reported_ms; /* when a silence was logged that still lasts; 0: none does */
     struct create_ordered ordered; /* since the newest frame, up to ordered_ms */
     int64_t ordered_ms;
     uint32_t frames_since_drive;

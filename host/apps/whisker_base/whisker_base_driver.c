@@ -175,7 +175,8 @@ static void whisker_base_driver_serve(struct driver *driver)
     if (driver->robot.port >= 0 && (driver->polled[PORT].revents || !driver->start.options->stream_clock)) {
         base_robot_read(&driver->robot, limit, cli_now_ms());
     }
-    base_robot_watch(&driver->robot, cli_now_ms()); /* a base that is not heard is stopped before a commander is obeyed */
+    base_robot_watch(&driver->robot,
+                     cli_now_ms()); /* a base that is not heard is stopped before a commander is obeyed */
     base_clients_serve(&driver->clients, &driver->polled[CLIENTS], cli_now_ms());
     if (driver->polled[LISTENING].revents) {
         for (int i = 0;

@@ -58,8 +58,8 @@ static bool whisker_base_guard_stop_at_end(struct guard *guard, int status)
 {
     const struct timespec pause = {.tv_nsec = BASE_RETRY_MS * 1000000};
     const bool stopped = WIFEXITED(status) && WEXITSTATUS(status) != BASE_TURNING;
-    for (int64_t until_ms = cli_now_ms() + END_MS; !whisker_base_guard_stop_wheels(guard) && guard->port >= 0 &&
-                                                   !stopped && cli_now_ms() < until_ms;) {
+    for (int64_t until_ms = cli_now_ms() + END_MS;
+         !whisker_base_guard_stop_wheels(guard) && guard->port >= 0 && !stopped && cli_now_ms() < until_ms;) {
         nanosleep(&pause, NULL);
     }
     return stopped || guard->stood || !guard->drove;

@@ -73,15 +73,17 @@ void base_robot_health(const struct base_robot *robot, char *text, size_t room)
         whisker_base_health_said(robot, CREATE_OI_VOLTAGE, &voltage),
         whisker_base_health_said(robot, CREATE_OI_CHARGE, &charge),
         whisker_base_health_said(robot, CREATE_OI_CAPACITY, &capacity),
-        !heard ? "unknown" : robot->low ? "1" : "0",
+        !heard       ? "unknown"
+        : robot->low ? "1"
+                     : "0",
         whisker_base_health_said(robot, CREATE_OI_CHARGING_SOURCES, &sources), robot->speeds.left_mm_s,
         robot->speeds.right_mm_s, robot->speeds.v_m_s, robot->speeds.omega_rad_s,
         create_source_name(odometry->settings.policy), create_source_name(odometry->distance),
         create_source_name(odometry->angle), whisker_base_health_remainder_name(odometry->remainder),
-        whisker_base_health_blocked_name(heard ? odometry->standing : CREATE_CANNOT_TELL), whisker_base_health_held_name(robot->held),
-        whisker_base_health_total(past->bytes, now->bytes), whisker_base_health_total(past->frames, now->frames),
-        whisker_base_health_total(past->corrupt, now->corrupt), whisker_base_health_total(past->skipped, now->skipped),
-        whisker_base_health_total(past->resyncs, now->resyncs), (unsigned long long)robot->missed,
-        (unsigned long long)robot->reconnects, (unsigned long long)robot->silences,
+        whisker_base_health_blocked_name(heard ? odometry->standing : CREATE_CANNOT_TELL),
+        whisker_base_health_held_name(robot->held), whisker_base_health_total(past->bytes, now->bytes),
+        whisker_base_health_total(past->frames, now->frames), whisker_base_health_total(past->corrupt, now->corrupt),
+        whisker_base_health_total(past->skipped, now->skipped), whisker_base_health_total(past->resyncs, now->resyncs),
+        (unsigned long long)robot->missed, (unsigned long long)robot->reconnects, (unsigned long long)robot->silences,
         (unsigned long long)robot->commander_stops, (unsigned long long)robot->mode_losses);
 }

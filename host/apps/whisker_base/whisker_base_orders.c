@@ -91,8 +91,7 @@ static bool orders_write_wheels(struct base_robot *robot)
     if (plain && orders_write_speeds(robot) && robot->cut_count == 0) {
         return true;
     }
-    return (plain && !stop) ? robot->cut_count > 0
-                            : orders_stop_firmly(robot) && (stop || orders_write_speeds(robot));
+    return (plain && !stop) ? robot->cut_count > 0 : orders_stop_firmly(robot) && (stop || orders_write_speeds(robot));
 }
 
 /* Whether an order has to wait for the line. In lock-step simulation nothing waits. */

@@ -1,6 +1,6 @@
 /*
- * Orders on their way to the base: the newest and no other waits, at the pace of the line, and the line gets whole ones.
- * A stop waits for nothing but room, and is tried until it is written.
+ * Orders on their way to the base: the newest and no other waits, at the pace of the line, and the line gets whole
+ * ones. A stop waits for nothing but room, and is tried until it is written.
  */
 #ifndef WHISKER_BASE_ORDERS_H
 #define WHISKER_BASE_ORDERS_H

@@ -166,10 +166,11 @@ static void whisker_base_robot_log_back(struct base_robot *robot)
 
 static void whisker_base_robot_log_carried(struct base_robot *robot)
 {
-    base_log(&robot->log.carried, LOG_WARN,
-             "%s: the base says what its wheels cannot have done: it was carried or pushed, or the line is bad; taken for "
-             "what was asked of it",
-             robot->options->port);
+    base_log(
+        &robot->log.carried, LOG_WARN,
+        "%s: the base says what its wheels cannot have done: it was carried or pushed, or the line is bad; taken for "
+        "what was asked of it",
+        robot->options->port);
 }
 
 /* The motion of the newest frame to all who want it. */
@@ -339,8 +340,8 @@ static void whisker_base_robot_log_silence(struct base_robot *robot, const struc
     }
 }
 
-/* Frames have stopped: stopped wheels are all that can be had without seeing. A base that left its mode by itself before
- * waits for the commander. */
+/* Frames have stopped: stopped wheels are all that can be had without seeing. A base that left its mode by itself
+ * before waits for the commander. */
 static void whisker_base_robot_restart_stream(struct base_robot *robot, int64_t now_ms)
 {
     robot->silences++;

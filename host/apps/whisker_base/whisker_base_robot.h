@@ -45,8 +45,8 @@ bool base_robot_kept(const struct base_robot *robot);
 /* Enters a mode, stopped; passive lets go. False: as of base_robot_stop(). */
 bool base_robot_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t now_ms);
 
-/* The command was lost, or is taken by another: a mode that the commander before asked for is no longer wanted. One that
- * lets go stays until somebody takes the command. */
+/* The command was lost, or is taken by another: a mode that the commander before asked for is no longer wanted. One
+ * that lets go stays until somebody takes the command. */
 void base_robot_change_commander(struct base_robot *robot, bool taken, int64_t now_ms);
 
 /* What time brings: writes what is due, stops wheels whose commander is silent, restarts a silent stream. Returns ms
@@ -62,8 +62,8 @@ void base_robot_health(const struct base_robot *robot, char *text, size_t room);
 /* Mode of the newest frame, as of enum create_oi_mode. */
 int32_t base_robot_mode_reported(const struct base_robot *robot);
 
-/* Asks the base to stand, to rest in passive mode and to send frames; soon: as soon as the line may have another request.
- * Until a frame comes the base counts as not heard.
+/* Asks the base to stand, to rest in passive mode and to send frames; soon: as soon as the line may have another
+ * request. Until a frame comes the base counts as not heard.
  *
  * Every request orders the packets in another way. So a frame in that order was said by a base that has heard this
  * request, and of its mode nothing is believed that was said before. A frame in the order of the last request that was

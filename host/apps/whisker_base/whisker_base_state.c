@@ -9,8 +9,8 @@
 #define ASK_FRAMES 5
 /* It does not enter its mode within 1 s: a person is informed, and it begins anew. */
 #define ENTER_FRAMES (1000 / CREATE_OI_PERIOD_MS)
-/* An order shows in the frames after 60 ms at the latest: period, line, adapter, and the pace of a lock-step simulation.
- * Frames that say other speeds for longer: it was not heard, or not whole. */
+/* An order shows in the frames after 60 ms at the latest: period, line, adapter, and the pace of a lock-step
+ * simulation. Frames that say other speeds for longer: it was not heard, or not whole. */
 #define UNHEARD_FRAMES 6
 /* A battery of 12 cells: below a tenth of its charge, or 1.0 V a cell, the base will not drive for long. */
 #define LOW_CHARGE 10
@@ -205,9 +205,9 @@ static void whisker_base_state_rest(struct base_robot *robot, int64_t now_ms)
                  robot->options->port);
     }
     whisker_base_state_begin_phase(robot,
-                                   robot->left                                 ? BASE_LEFT
+                                   robot->left                               ? BASE_LEFT
                                    : robot->wanted == CREATE_OI_MODE_PASSIVE ? BASE_ENTERED
-                                                                               : BASE_ENTERING,
+                                                                             : BASE_ENTERING,
                                    now_ms);
 }
 
@@ -223,8 +223,8 @@ static void whisker_base_state_enter(struct base_robot *robot, int64_t now_ms)
     }
 }
 
-/* A base that leaves its mode has stopped its wheels, if that is what it meant; it goes back only when the commander says
- * so. */
+/* A base that leaves its mode has stopped its wheels, if that is what it meant; it goes back only when the commander
+ * says so. */
 static void whisker_base_state_leave(struct base_robot *robot, int64_t now_ms)
 {
     robot->mode_losses++;
@@ -262,10 +262,11 @@ static void whisker_base_state_watch_orders(struct base_robot *robot, int64_t no
     robot->unheard = turns && !base_orders_heard(robot) ? robot->unheard + 1 : 0;
     if (robot->unheard > 0 && robot->unheard % UNHEARD_FRAMES == 0) {
         robot->firm = robot->may_turn = true;
-        base_log(&robot->log.orders, LOG_WARN,
-                 "%s: ordered %d and %d mm/s, the base says %d and %d: ordered again; the wheels may turn; check the wire "
-                 "to it",
-                 robot->options->port, robot->written.left_mm_s, robot->written.right_mm_s, left, right);
+        base_log(
+            &robot->log.orders, LOG_WARN,
+            "%s: ordered %d and %d mm/s, the base says %d and %d: ordered again; the wheels may turn; check the wire "
+            "to it",
+            robot->options->port, robot->written.left_mm_s, robot->written.right_mm_s, left, right);
         base_orders_wheels(robot, robot->speeds, now_ms);
     }
 }

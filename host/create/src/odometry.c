@@ -84,8 +84,8 @@ static bool odometry_counts_encoders(const struct create_odometry_settings *sett
            (settings->policy == CREATE_AUTO && create_model_facts(settings->model)->count_m > 0);
 }
 
-/* Whether more is reported, or the opposite, than whole units and the wheels' spread make of what was asked for: somebody
- * moves the body. */
+/* Whether more is reported, or the opposite, than whole units and the wheels' spread make of what was asked for:
+ * somebody moves the body. */
 static bool odometry_exceeds(double asked, double reported)
 {
     const double along = asked < 0 ? -reported : reported;
@@ -127,8 +127,8 @@ struct reading {
     double motion, sigma, loose, grain;
 };
 
-/* Motion by requested speeds. Those of a frame are of its end: what has changed did so at any time since the one before,
- * and what a start is thought to be more a stop is less. */
+/* Motion by requested speeds. Those of a frame are of its end: what has changed did so at any time since the one
+ * before, and what a start is thought to be more a stop is less. */
 static struct reading odometry_request(const struct create_odometry *odometry, double was, double now, double scale)
 {
     return (struct reading){now * scale, odometry->settings.requested_sigma, UNIFORM_SIGMA * fabs(now - was), 0};
@@ -177,9 +177,9 @@ struct estimate {
     double motion, sigma;
 };
 
-/* Of each of so many frames. Nobody has ordered other speeds: what was asked for before, and if it has changed, at any time
- * between. Otherwise what was ordered, if the base has heard the last order, or it went on as before; of several it may
- * have heard only the last. */
+/* Of each of so many frames. Nobody has ordered other speeds: what was asked for before, and if it has changed, at any
+ * time between. Otherwise what was ordered, if the base has heard the last order, or it went on as before; of several
+ * it may have heard only the last. */
 static struct estimate odometry_estimate(const struct create_odometry *odometry, const struct create_frame *frame,
                                          double was, double now, double ordered, double way)
 {
@@ -196,11 +196,10 @@ static void odometry_add_estimate(struct create_odometry *odometry, struct creat
                                   const struct create_frame *frame)
 {
     const struct create_ordered *orders = &frame->ordered;
-    const struct estimate distance = odometry_estimate(odometry, frame, odometry->asked_m, odometry_asked_distance(frame),
-                                                       orders->distance, orders->way);
-    const struct estimate angle =
-        odometry_estimate(odometry, frame, odometry->asked_rad, odometry_asked_angle(odometry, frame), orders->angle,
-                          orders->turn);
+    const struct estimate distance = odometry_estimate(odometry, frame, odometry->asked_m,
+                                                       odometry_asked_distance(frame), orders->distance, orders->way);
+    const struct estimate angle = odometry_estimate(odometry, frame, odometry->asked_rad,
+                                                    odometry_asked_angle(odometry, frame), orders->angle, orders->turn);
     odometry->missed_m = distance.motion;
     odometry->missed_rad = angle.motion;
     step->distance += frames * distance.motion;
@@ -226,16 +225,17 @@ static double odometry_wheel_way(const struct create_odometry *odometry, double 
 static void odometry_bound(struct create_odometry *odometry, struct create_step *step, const struct create_frame *frame)
 {
     const double time_s = (frame->missed + 1) * PERIOD_S + HELD_S;
-    const double asked_m = fmax(odometry_wheel_way(odometry, odometry->asked_m, odometry->asked_rad),
-                                odometry_wheel_way(odometry, odometry_asked_distance(frame),
-                                                   odometry_asked_angle(odometry, frame)));
+    const double asked_m =
+        fmax(odometry_wheel_way(odometry, odometry->asked_m, odometry->asked_rad),
+             odometry_wheel_way(odometry, odometry_asked_distance(frame), odometry_asked_angle(odometry, frame)));
     const double driven_m = DRIVEN * SPEED_MAX_M_S * time_s;
-    const double most_m = PUSHED_M_S * fmin(time_s, PUSHED_MOST_S) +
-                          DRIVEN * fmin(asked_m / PERIOD_S, SPEED_MAX_M_S) * time_s;
+    const double most_m =
+        PUSHED_M_S * fmin(time_s, PUSHED_MOST_S) + DRIVEN * fmin(asked_m / PERIOD_S, SPEED_MAX_M_S) * time_s;
     const double way_m = odometry_wheel_way(odometry, step->distance, step->angle);
     if (way_m > most_m) {
         odometry->carried++;
-        *step = (struct create_step){.loose_distance = driven_m, .loose_angle = driven_m / odometry->settings.wheel_base_m};
+        *step =
+            (struct create_step){.loose_distance = driven_m, .loose_angle = driven_m / odometry->settings.wheel_base_m};
         odometry_add_estimate(odometry, step, 1, frame);
     } else if (way_m > driven_m || frame->timing == CREATE_SURPLUS) {
         step->loose_distance = fabs(step->distance);
@@ -252,8 +252,8 @@ static struct create_step odometry_step_by_encoders(struct create_odometry *odom
         return (struct create_step){0};
     }
     /* Two wheels, each known to a count: their mean and difference are worth these units. */
-    const struct reading distance = {(right + left) / 2 * settings->distance_scale, settings->relative_sigma,
-                                     0, count_m / sqrt(2)};
+    const struct reading distance = {(right + left) / 2 * settings->distance_scale, settings->relative_sigma, 0,
+                                     count_m / sqrt(2)};
     const struct reading angle = {(right - left) / settings->wheel_base_m * settings->angle_scale,
                                   settings->relative_sigma, 0, count_m * sqrt(2) / settings->wheel_base_m};
     struct create_step step = odometry_step_of(odometry, distance, angle);

@@ -54,7 +54,8 @@ int create_port_open(const char *path, uint32_t baud)
         return -1;
     }
     const int port = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (port >= 0 && (flock(port, LOCK_EX | LOCK_NB) != 0 || !port_make_raw(port, speed) || ioctl(port, TIOCEXCL) != 0)) {
+    if (port >= 0 &&
+        (flock(port, LOCK_EX | LOCK_NB) != 0 || !port_make_raw(port, speed) || ioctl(port, TIOCEXCL) != 0)) {
         const int error = errno;
         close(port);
         errno = error;

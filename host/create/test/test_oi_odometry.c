@@ -19,7 +19,8 @@ static void requested_speeds_are_less_sure_than_reported_ones(void **state)
     base = base_begin(CREATE_1, CREATE_REPORTED, true);
     base_drive(&base, 200, 200, 1.5, 1);
     create_motion_covariance(&base.motion, reported);
-    assert_close(requested[0][0], 0.03 * 0.03 + 0.003 * 0.003 / 12, 1e-12); /* 10 % of 0.3 m, when in a frame it began */
+    assert_close(requested[0][0], 0.03 * 0.03 + 0.003 * 0.003 / 12,
+                 1e-12);                                                /* 10 % of 0.3 m, when in a frame it began */
     assert_close(reported[0][0], 0.015 * 0.015 + 2 * 1e-6 / 12, 1e-12); /* 5 %, and two halves of a millimetre */
     assert_close(reported[2][2], 0.015 * 0.015 + 2 * DEGREE * DEGREE / 12, 1e-12); /* 0.05 rad per m */
 }
@@ -42,8 +43,8 @@ static void wheel_base_and_scales_are_settings(void **state)
     assert_close(step.angle, 0.05 / 0.25 * PERIOD_S * 0.9, 1e-12);
 }
 
-/* Frames that never came: reported motion went with them and is estimated. What was asked for all the time is as sure as
- * integrated requests are; what changed meanwhile did so at any time. */
+/* Frames that never came: reported motion went with them and is estimated. What was asked for all the time is as sure
+ * as integrated requests are; what changed meanwhile did so at any time. */
 static void motion_of_missed_frames_is_estimated(void **state)
 {
     (void)state;

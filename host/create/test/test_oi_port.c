@@ -152,9 +152,12 @@ static void a_line_that_goes_is_noticed(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_byte_passes),           cmocka_unit_test(the_baud_is_set),
-        cmocka_unit_test(no_modem_wire_is_waited_for), cmocka_unit_test(what_is_no_free_line_is_refused),
-        cmocka_unit_test(a_full_line_takes_a_stop_as_soon_as_it_can), cmocka_unit_test(a_line_that_goes_is_noticed),
+        cmocka_unit_test(every_byte_passes),
+        cmocka_unit_test(the_baud_is_set),
+        cmocka_unit_test(no_modem_wire_is_waited_for),
+        cmocka_unit_test(what_is_no_free_line_is_refused),
+        cmocka_unit_test(a_full_line_takes_a_stop_as_soon_as_it_can),
+        cmocka_unit_test(a_line_that_goes_is_noticed),
     };
     return cmocka_run_group_tests_name("port", tests, NULL, NULL);
 }

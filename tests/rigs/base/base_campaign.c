@@ -1,11 +1,12 @@
 /*
- * Random draws of what a base, its line, its commanders and this machine can do to the driver of whisker-base, judged by
- * what the emulator really does: wheels, mode, health and odometry have to agree with it, or say that they do not know.
+ * Random draws of what a base, its line, its commanders and this machine can do to the driver of whisker-base, judged
+ * by what the emulator really does: wheels, mode, health and odometry have to agree with it, or say that they do not
+ * know.
  *
  *     base_campaign FIRST COUNT [JOURNAL]
  *
- * The clock is simulated: a draw of 12 s takes milliseconds. Draw N is always the same. JOURNAL keeps the next number: a
- * campaign that was ended goes on behind it. Each draw that fails prints its number and why. Exit code 1: some did.
+ * The clock is simulated: a draw of 12 s takes milliseconds. Draw N is always the same. JOURNAL keeps the next number:
+ * a campaign that was ended goes on behind it. Each draw that fails prints its number and why. Exit code 1: some did.
  */
 #include <errno.h>
 #include <math.h>
@@ -32,7 +33,8 @@
 #define FAULTS_TO_MS 7000
 #define RECOVER_MS 10500 /* by then every fault is over, and its consequences */
 #define END_MS 12000
-/* The commander drives, and then stands for long enough that all motion has been reported: then odometry is measured. */
+/* The commander drives, and then stands for long enough that all motion has been reported: then odometry is measured.
+ */
 #define LEG_MS 2000
 #define STAND_MS 600
 #define TICKS_PER_S (WHISKER_LIMIT_CLOCK_HZ / WHISKER_LIMIT_TICK_PERIOD)
@@ -45,7 +47,7 @@
 #define AGREE_MS 170
 #define BELIEVED_MS (BASE_SILENCE_MS + AGREE_MS)
 #define CHI2_90 6.251388631170325 /* of 3 degrees of freedom */
-#define RESOLUTION 1e-3 /* m, rad: of the comparison; what is of second order in the errors is less */
+#define RESOLUTION 1e-3           /* m, rad: of the comparison; what is of second order in the errors is less */
 /* Of regions of 90 %, over at least ENOUGH disturbances. */
 #define COVER_LEAST 0.85
 #define COVER_MOST 0.97
@@ -53,19 +55,41 @@
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
 
 enum kind {
-    MUTE, DEAF, SILENT, HELD, RESTART, CLIFF, DROP, CHARGER, /* the emulator's events */
-    UNPLUG, HICCUP, KILL, CHANGE, QUIET, MODE, FLOOD, STOPS, /* adapter, machine, commanders */
-    LOSE, FLIP, TWICE, LOSE_ORDER, FLIP_ORDER, LIE,          /* bytes */
-    PUSH, BLOCK, KINDS
+    MUTE,
+    DEAF,
+    SILENT,
+    HELD,
+    RESTART,
+    CLIFF,
+    DROP,
+    CHARGER, /* the emulator's events */
+    UNPLUG,
+    HICCUP,
+    KILL,
+    CHANGE,
+    QUIET,
+    MODE,
+    FLOOD,
+    STOPS, /* adapter, machine, commanders */
+    LOSE,
+    FLIP,
+    TWICE,
+    LOSE_ORDER,
+    FLIP_ORDER,
+    LIE, /* bytes */
+    PUSH,
+    BLOCK,
+    KINDS
 };
 
-static const uint32_t stimuli_of[] = {SIM_CREATE_MUTE,    SIM_CREATE_DEAF,           SIM_CREATE_SILENT,    SIM_CREATE_HELD,
-                                      SIM_CREATE_RESTART, SIM_CREATE_CLIFF_FRONT_LEFT, SIM_CREATE_DROP_LEFT, SIM_CREATE_CHARGER};
-static const int longest_ms[KINDS] = {[MUTE] = 1500, [DEAF] = 1500, [SILENT] = 1500, [HELD] = 400, [RESTART] = 1500,
-                                      [CLIFF] = 1000, [DROP] = 1000, [CHARGER] = 1000, [UNPLUG] = 1500, [HICCUP] = 1200,
-                                      [KILL] = 1, [CHANGE] = 1, [QUIET] = 1400, [MODE] = 1, [FLOOD] = 800, [STOPS] = 800,
-                                      [LOSE] = 60, [FLIP] = 60, [TWICE] = 60, [LOSE_ORDER] = 60, [FLIP_ORDER] = 60, [LIE] = 45,
-                                      [PUSH] = 500, [BLOCK] = 600};
+static const uint32_t stimuli_of[] = {SIM_CREATE_MUTE,      SIM_CREATE_DEAF,    SIM_CREATE_SILENT,
+                                      SIM_CREATE_HELD,      SIM_CREATE_RESTART, SIM_CREATE_CLIFF_FRONT_LEFT,
+                                      SIM_CREATE_DROP_LEFT, SIM_CREATE_CHARGER};
+static const int longest_ms[KINDS] = {
+    [MUTE] = 1500,  [DEAF] = 1500,     [SILENT] = 1500,   [HELD] = 400,    [RESTART] = 1500, [CLIFF] = 1000,
+    [DROP] = 1000,  [CHARGER] = 1000,  [UNPLUG] = 1500,   [HICCUP] = 1200, [KILL] = 1,       [CHANGE] = 1,
+    [QUIET] = 1400, [MODE] = 1,        [FLOOD] = 800,     [STOPS] = 800,   [LOSE] = 60,      [FLIP] = 60,
+    [TWICE] = 60,   [LOSE_ORDER] = 60, [FLIP_ORDER] = 60, [LIE] = 45,      [PUSH] = 500,     [BLOCK] = 600};
 
 struct fault {
     enum kind kind;
@@ -87,7 +111,8 @@ static size_t rx_count;
 static bool plugged;
 static uint8_t frame_held[256]; /* what has come to the driver's port, as the beginning of a frame */
 static size_t frame_count;
-static int64_t heard_ms, to_robot_ms, to_host_ms, driver_ms, opened_ms; /* last whole frame; ends of the newest faults */
+static int64_t heard_ms, to_robot_ms, to_host_ms, driver_ms,
+    opened_ms; /* last whole frame; ends of the newest faults */
 
 static int commander[2];
 static int active;
@@ -99,7 +124,7 @@ static unsigned recent_count;
 static double true_x, true_y, true_theta, scale_distance, scale_angle, drift;
 static struct sim_create_motion counted;
 static struct create_motion seen_motion;
-static uint64_t spoilt_orders; /* up to this byte sent to the base */
+static uint64_t spoilt_orders;     /* up to this byte sent to the base */
 static bool measurable, disturbed; /* since the odometry was measured last */
 static int64_t turned_ms;
 static unsigned measured[2], within[2], measured_clean, within_clean;
@@ -194,7 +219,8 @@ void daemon_log(enum daemon_priority priority, const char *format, ...)
     snprintf(logged + used, sizeof logged - used, "    %6lld ms: %s\n", (long long)(now_ms - BEGIN_MS), line);
 }
 
-/* -------------------------------------------------------------------------------------------------------- the judgement
+/* -------------------------------------------------------------------------------------------------------- the
+ * judgement
  */
 
 static void blame(const char *format, ...)
@@ -245,7 +271,8 @@ static const char *health_of(const char *key)
  * spoilt, hears nothing any more. */
 static bool excused(void)
 {
-    return sim_create_baud(create) != create_model_facts(options.odometry.model)->baud || now_ms <= to_robot_ms + BASE_SILENCE_MS + MARGIN_MS || now_ms <= driver_ms + MARGIN_MS || !plugged ||
+    return sim_create_baud(create) != create_model_facts(options.odometry.model)->baud ||
+           now_ms <= to_robot_ms + BASE_SILENCE_MS + MARGIN_MS || now_ms <= driver_ms + MARGIN_MS || !plugged ||
            now_ms <= opened_ms + MARGIN_MS + 40;
 }
 
@@ -293,8 +320,9 @@ static void judge_wheels(void)
     }
     const int64_t most_ms = now_ms - heard_ms < MARGIN_MS && now_ms > to_host_ms + AGREE_MS ? AGREE_MS : BELIEVED_MS;
     if (now_ms - wheels_wrong_ms > most_ms) {
-        blame("ordered %d %d and said to be heard, but the wheels turn at %.0f %.0f for %lld ms", robot.written.left_mm_s,
-              robot.written.right_mm_s, left_mm_s, right_mm_s, (long long)(now_ms - wheels_wrong_ms));
+        blame("ordered %d %d and said to be heard, but the wheels turn at %.0f %.0f for %lld ms",
+              robot.written.left_mm_s, robot.written.right_mm_s, left_mm_s, right_mm_s,
+              (long long)(now_ms - wheels_wrong_ms));
     }
 }
 
@@ -309,8 +337,7 @@ static void judge_speeds(void)
     if (!known && !excused() && now_ms - stray_ms > AGREE_MS) {
         blame("wheels at %.0f %.0f mm/s, which nobody has ordered", left_mm_s, right_mm_s);
     } else if (!known && now_ms > to_robot_ms + BELIEVED_MS && plugged) {
-        blame("wheels at %.0f %.0f mm/s for a moment, which nobody has ordered", left_mm_s,
-              right_mm_s);
+        blame("wheels at %.0f %.0f mm/s for a moment, which nobody has ordered", left_mm_s, right_mm_s);
     }
 }
 
@@ -427,17 +454,19 @@ static void end_driver(void)
 
 static void add_place(enum sim_create_spoil spoil, const struct fault *fault, uint64_t first)
 {
-    static const uint8_t lied[] = {CREATE_OI_MODE, CREATE_OI_DISTANCE, CREATE_OI_ANGLE, CREATE_OI_REQUESTED_LEFT,
-                                   CREATE_OI_REQUESTED_RIGHT, CREATE_OI_ENCODER_LEFT, CREATE_OI_ENCODER_RIGHT,
-                                   CREATE_OI_BUMPS_DROPS, CREATE_OI_CHARGE};
-    struct sim_create_fault place = {spoil, first, spoil == SIM_CREATE_LIE ? 1 + (uint64_t)whole(3) : (uint64_t)(fault->to_ms - fault->from_ms),
-                                     1 << whole(8), 0};
+    static const uint8_t lied[] = {CREATE_OI_MODE,           CREATE_OI_DISTANCE,        CREATE_OI_ANGLE,
+                                   CREATE_OI_REQUESTED_LEFT, CREATE_OI_REQUESTED_RIGHT, CREATE_OI_ENCODER_LEFT,
+                                   CREATE_OI_ENCODER_RIGHT,  CREATE_OI_BUMPS_DROPS,     CREATE_OI_CHARGE};
+    struct sim_create_fault place = {
+        spoil, first, spoil == SIM_CREATE_LIE ? 1 + (uint64_t)whole(3) : (uint64_t)(fault->to_ms - fault->from_ms),
+        1 << whole(8), 0};
     if (spoil == SIM_CREATE_LIE) {
         place.packet = lied[whole(COUNT(lied))];
         place.value = place.packet == CREATE_OI_MODE ? whole(4) : whole(65536);
     }
-    sim_create_spoil(create, &place);
-    spoilt_orders = spoil == SIM_CREATE_LOSE_ORDER || spoil == SIM_CREATE_FLIP_ORDER ? place.first + place.count : spoilt_orders;
+    sim_create_add_fault(create, &place);
+    spoilt_orders =
+        spoil == SIM_CREATE_LOSE_ORDER || spoil == SIM_CREATE_FLIP_ORDER ? place.first + place.count : spoilt_orders;
 }
 
 /* What begins now. */
@@ -468,14 +497,16 @@ static void begin_fault(const struct fault *fault)
     case LOSE:
     case FLIP:
     case TWICE:
-        add_place((enum sim_create_spoil)(SIM_CREATE_LOSE + (fault->kind - LOSE)), fault, sim_create_places(create).sent + (uint64_t)whole(40));
+        add_place((enum sim_create_spoil)(SIM_CREATE_LOSE + (fault->kind - LOSE)), fault,
+                  sim_create_where(create).sent + (uint64_t)whole(40));
         break;
     case LOSE_ORDER:
     case FLIP_ORDER:
-        add_place(fault->kind == LOSE_ORDER ? SIM_CREATE_LOSE_ORDER : SIM_CREATE_FLIP_ORDER, fault, sim_create_places(create).received + (uint64_t)whole(12));
+        add_place(fault->kind == LOSE_ORDER ? SIM_CREATE_LOSE_ORDER : SIM_CREATE_FLIP_ORDER, fault,
+                  sim_create_where(create).received + (uint64_t)whole(12));
         break;
     case LIE:
-        add_place(SIM_CREATE_LIE, fault, sim_create_places(create).frames);
+        add_place(SIM_CREATE_LIE, fault, sim_create_where(create).frames);
         break;
     default:
         break;
@@ -610,7 +641,8 @@ static void command(void)
     order(active, text);
     if (v != 0 || omega != 0) {
         ordered_ms = now_ms;
-        recent[recent_count % COUNT(recent)] = create_choose_speeds(options.odometry.model, options.odometry.wheel_base_m, v, omega);
+        recent[recent_count % COUNT(recent)] =
+            create_choose_speeds(options.odometry.model, options.odometry.wheel_base_m, v, omega);
         recent_count++;
     }
 }
@@ -674,8 +706,8 @@ static void measure(void)
         disturbed |= now_ms >= faults[i].from_ms && now_ms < faults[i].to_ms;
         measurable &= now_ms < faults[i].from_ms || (faults[i].kind != RESTART && faults[i].kind != KILL);
     }
-    const bool settled = now_ms - turned_ms > STAND_MS / 2 && now_ms - heard_ms < MARGIN_MS && base_robot_heard(&robot) &&
-                         now_ms > to_host_ms + AGREE_MS && now_ms > driver_ms + AGREE_MS;
+    const bool settled = now_ms - turned_ms > STAND_MS / 2 && now_ms - heard_ms < MARGIN_MS &&
+                         base_robot_heard(&robot) && now_ms > to_host_ms + AGREE_MS && now_ms > driver_ms + AGREE_MS;
     if (leg_ms() != LEG_MS - 1 || !settled) {
         return;
     }
@@ -748,9 +780,10 @@ static void begin_draw(uint64_t number)
     frame_count = 0;
 }
 
-static const char *const kind_names[KINDS] = {"mute", "deaf", "silent", "held", "restart", "cliff", "drop", "charger",
-                                              "unplug", "hiccup", "kill", "change", "quiet", "mode", "flood", "stops",
-                                              "lose", "flip", "twice", "lose-order", "flip-order", "lie", "push", "block"};
+static const char *const kind_names[KINDS] = {"mute",  "deaf",       "silent",     "held",   "restart", "cliff",
+                                              "drop",  "charger",    "unplug",     "hiccup", "kill",    "change",
+                                              "quiet", "mode",       "flood",      "stops",  "lose",    "flip",
+                                              "twice", "lose-order", "flip-order", "lie",    "push",    "block"};
 
 static void run_draw(uint64_t number)
 {
@@ -759,7 +792,7 @@ static void run_draw(uint64_t number)
         for (int i = 0; i < fault_count; i++) {
             note_fault(&faults[i]);
         }
-        if (sim_create_places(create).received < spoilt_orders) {
+        if (sim_create_where(create).received < spoilt_orders) {
             to_robot_ms = now_ms + 2 * AGREE_MS; /* it waits for the next order */
         }
         counted.stimuli = stimuli();
@@ -844,9 +877,10 @@ int main(int argc, char **argv)
         }
     }
     write_journal(journal, end);
-    printf("%llu draws, %u failed; 90 %% regions of the odometry held in %u of %u disturbed legs of Create 1, %u of %u of "
-           "Create 2, %u of %u others\n",
-           (unsigned long long)(end - first), failed, within[0], measured[0], within[1], measured[1], within_clean,
-           measured_clean);
+    printf(
+        "%llu draws, %u failed; 90 %% regions of the odometry held in %u of %u disturbed legs of Create 1, %u of %u of "
+        "Create 2, %u of %u others\n",
+        (unsigned long long)(end - first), failed, within[0], measured[0], within[1], measured[1], within_clean,
+        measured_clean);
     return failed > 0 || !covers(0) || !covers(1);
 }

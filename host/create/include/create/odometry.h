@@ -72,7 +72,7 @@ struct create_odometry {
     bool started;
     double asked_m, asked_rad;   /* motion asked for in the newest frame */
     double missed_m, missed_rad; /* each of the frames missed last was thought to be worth */
-    int32_t left, right;       /* encoders at the newest frame */
+    int32_t left, right;         /* encoders at the newest frame */
 };
 
 /* Usual settings of a model: policy CREATE_AUTO, 5 % (paper), 10 % where requested, 0.05 rad/m (assumed). */

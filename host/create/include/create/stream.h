@@ -40,8 +40,8 @@ struct create_ordered {
 struct create_frame {
     int32_t value[CREATE_OI_PACKET_MAX + 1];
     enum create_timing timing;
-    uint32_t missed;  /* frames that should have come since the one before, judged by the bytes skipped; a caller that has
-                         a clock judges anew */
+    uint32_t missed; /* frames that should have come since the one before, judged by the bytes skipped; a caller that
+                        has a clock judges anew */
     struct create_ordered ordered; /* since the frame before; a caller that orders speeds sets it */
 };
 

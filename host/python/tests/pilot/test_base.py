@@ -13,7 +13,19 @@ import sys
 from pathlib import Path
 
 import pytest
-from createpeer import FIRM_STOP, FULL, FULL_MODE, PAUSE, SAFE, SAFE_MODE, START, STOP, STREAM, Driver, Heart, drive_order
+from createpeer import (
+    FIRM_STOP,
+    FULL,
+    FULL_MODE,
+    PAUSE,
+    SAFE,
+    SAFE_MODE,
+    START,
+    STOP,
+    Driver,
+    Heart,
+    drive_order,
+)
 from hostile_clients import attacked, serve_honest
 
 from crunchbot.pilot import base

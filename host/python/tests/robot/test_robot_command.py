@@ -1,8 +1,8 @@
 """`whisker robot`: which processes it starts, by its options."""
 
 import os
-import subprocess
 import socket
+import subprocess
 import sys
 import threading
 import time
