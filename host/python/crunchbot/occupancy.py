@@ -153,12 +153,6 @@ def placed(
         raise ValueError(f"field 'origin': the yaw must be that of the origin in arena.toml, {origin[2]:g}")
     high_x, high_y = x + occupancy.size_m[0], y + occupancy.size_m[1]
     wide, high = size_m
-    if min(high_x, wide) <= max(x, 0.0) or min(high_y, high) <= max(y, 0.0):
-        area = f"x {x:g} to {high_x:g} and y {y:g} to {high_y:g} m"
-        raise ValueError(
-            f"field 'origin' lays the map on {area}, beside the arena of {wide:g} x {high:g} m from (0, 0); give the "
-            "corner's place in arena.toml's frame, or leave arena.toml out"
-        )
     margins = [(0.0, 0.0, x, high), (high_x, 0.0, wide, high), (x, 0.0, high_x, y), (x, high_y, high_x, high)]
     solid, unknown = (
         [(a + x, b + y, c + x, d + y) for a, b, c, d in boxes] for boxes in (occupancy.solid, occupancy.unknown)

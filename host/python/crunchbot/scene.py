@@ -216,11 +216,14 @@ def _read(folder: Path, map_file) -> Scene:
 
 def _with_map(arena: Arena, map_file, origin: Pose) -> Arena:
     try:
-        solid, unknown = placed(read_map(map_file), arena.size_m, origin)
+        occupancy = read_map(map_file)
+        solid, unknown = placed(occupancy, arena.size_m, origin)
     except ValueError as error:
         raise error if isinstance(error, SceneError) else SceneError(f"{map_file}: {error}") from error
     if not has_place(arena.size_m, (*solid, *unknown), 0.0):
-        raise SceneError(f"{map_file}: no free cell is inside the arena of {arena.size_m} m; mend the field 'origin'")
+        (x, y, _), (wide, high) = occupancy.origin, occupancy.size_m
+        area = f"x {x:g} to {x + wide:g} and y {y:g} to {y + high:g} m, where nothing of the arena is free"
+        raise SceneError(f"{map_file}: field 'origin' lays the map on {area}; give its place in the frame of {ARENA}")
     return replace(arena, obstacles=solid, unknown=unknown)
 
 

@@ -19,6 +19,7 @@ from .salvage import MAGIC, Damaged, Found, Salvage, inner_records
 DAMAGE_MOST = 100  # lines of damaged places, and as many of what is lost by them
 METADATA_MOST = 1 << 22  # bytes of all metadata records together
 SEARCHED = 1 << 24  # bytes in which a file that does not begin as MCAP does must show a record of one
+LFS = b"version https://git-lfs.github.com/"  # how what stands for a file in a clone without it begins
 NUMBERED = "whisker_numbered"  # key of a channel's metadata: sequence numbers count its messages in the file, from 1 on
 PARSED = {Opcode.CHANNEL, Opcode.MESSAGE, Opcode.METADATA, Opcode.STATISTICS, Opcode.DATA_END, Opcode.FOOTER}
 
@@ -193,7 +194,9 @@ class McapFile:
 
     def _open(self) -> None:
         if not self._is_mcap():
-            raise RecordingError(f"{self.path}: not an MCAP file; give a recording made by 'whisker record'")
+            is_pointer = self._salvage.read(0, len(LFS)) == LFS
+            remedy = "fetch it by 'git lfs pull'" if is_pointer else "give a recording made by 'whisker record'"
+            raise RecordingError(f"{self.path}: not an MCAP file{' but its Git LFS pointer' * is_pointer}; {remedy}")
         for found in self._salvage.records(unpack=False):
             if found.opcode in PARSED - {Opcode.MESSAGE}:
                 with suppress(Damaged):  # `messages` says so

@@ -439,16 +439,23 @@ def test_a_map_gets_what_it_must(capsys, tmp_path, room_m, name):
 def test_a_map_beside_its_arena_is_refused_in_its_numbers(capsys, tmp_path):
     folder = shutil.copytree(CASES / "room", tmp_path / "s")
     yaml(ORIGIN, "origin: [-10.0, -3.0, 0.0]")(folder)
-    beside = (
-        "! 'origin' lays the map on x -10 to -7 and y -3 to -1 m, beside the arena of 2.5 x 2.5 m from .0, 0.; give"
-    )
+    beside = "! 'origin' lays the map on x -10 to -7 and y -3 to -1 m, where nothing of the arena is free; give"
     judge(beside, 0.0, *answered(capsys, CASES / "plain", "--map", folder / "ok.yaml"))
     yaml("[-10.0, -3.0, 0.0]", "[-2.98, 0.0, 0.0]")(folder)  # its right wall alone reaches in
     judge(
-        "! no free cell is inside the arena .*; mend",
+        "! 'origin' lays the map on x -2.98 to 0.02 .*; give",
         0.0,
         *answered(capsys, CASES / "plain", "--map", folder / "ok.yaml"),
     )
+
+
+def test_rows_that_come_late_are_not_missing():
+    scene = load(CASES / "plain")
+    rows = read_observations(observations_path(CASES / "plain"), scene)
+    order = np.arange(len(rows))
+    order[9::10], order[8::10] = order[8::10].copy(), order[9::10].copy()
+    late = replace(rows, t_s=rows.t_s[order])
+    assert [re.search(ORDER, fault) is not None for fault in row_faults(late, scene.robot)] == [True]
 
 
 def test_alpha_and_scale_are_read_as_map_servers_do(tmp_path):

@@ -161,7 +161,10 @@ def test_every_byte_of_head_and_end_is_accounted_for(tmp_path, whole):
 def test_files_of_other_kinds_are_refused_at_once(tmp_path):
     path = tmp_path / "a.mp4"
     path.write_bytes(np.random.default_rng(1).bytes(1 << 20))
-    with pytest.raises(RecordingError, match="not an MCAP file"):
+    with pytest.raises(RecordingError, match="not an MCAP file; give"):
+        McapFile(path)
+    path.write_text(f"version https://git-lfs.github.com/spec/v1\noid sha256:{64 * '0'}\nsize 12345\n")
+    with pytest.raises(RecordingError, match="not an MCAP file but its Git LFS pointer; fetch it by 'git lfs pull'"):
         McapFile(path)
 
 
