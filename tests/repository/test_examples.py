@@ -24,6 +24,7 @@ FOREVER = 130  # ended by Ctrl-C
 # What a command prints, or the exit code of one that runs until it is stopped, by its first words.
 OFFLINE = {
     "whisker examples": "examples: contacts.csv, ",
+    "whisker try": FOREVER,
     "whisker localise": '"pose_error_median_m": 0.0',
     "whisker map": '"faces": ',
     "whisker scene make": "scenes/7: anchor+kidnap, seed 7, 1200 rows",
@@ -140,7 +141,8 @@ def place(tmp_path_factory):
 
 @pytest.mark.parametrize("command", list(OFFLINE)[1:])
 def test_examples_on_files(place, command):
-    check(EXAMPLES[command], place, OFFLINE[command], 0.0)
+    more = {"whisker try": " --no-open"}.get(command, "")
+    check(EXAMPLES[command] + more, place, OFFLINE[command], 5.0)
 
 
 def test_the_data_set_is_not_written_over(place):

@@ -55,7 +55,7 @@ MISTAKES = {
     "whisker replay examples/contacts.csv": ("not an MCAP file", "give a recording made by 'whisker record'"),
     "whisker replay examples/drive.mcap --speed fast": ("'fast' is not a number above 0", "--help"),
     "whisker calibrate --out cal --lane 99": ("'99' is not a whole number from 0 to 27", "--help"),
-    "whisker view --port 99999": ("99999 is not a port", "give a number from 0 to 65535"),
+    "whisker view --port 99999": ("'99999' is not a whole number from 0 to 65535", "--help"),
     "whisker flash nosuch.whex": ("nosuch.whex: cannot be read", "check the name, or make it"),
     "whisker flash examples/texture.json": ("no firmware image", "build it again"),
     "whisker flash examples/node.whex": ("no bridge is connected", "plug it in; check its power and cable"),
