@@ -19,19 +19,22 @@ export function romCrc(bytes) {
 
 // The flash behind the SSI: answers command 4Bh with its number; else XIP.
 class Flash {
-  constructor(number) { Object.assign(this, { number, enabled: 0, control: 0, out: [], place: 0, xip: false }); }
+  constructor(number) { Object.assign(this, { number, enabled: 0, control: 0, control1: null, baud: 0, select: 0, out: [], place: 0, xip: false }); }
   writeUint32Atomic(offset, value) {
     if (offset === 0x00) this.control = value;
     else if (offset === 0x08) { this.enabled = value; this.place = 0; this.out = []; }
+    else if (offset === 0x04) this.control1 = value;
+    else if (offset === 0x10) this.select = value;
+    else if (offset === 0x14) this.baud = value;
     else if (offset === 0xf4) this.xip = value === ((0x03 << 24) | (2 << 8) | (6 << 2));
-    else if (offset === 0x60 && this.enabled && this.control === 7 << 16) {
+    else if (offset === 0x60 && this.enabled && this.select === 1 && this.baud >= 4 && this.control === 7 << 16) {
       if (this.place === 0) this.command = value;
       this.out.push(this.command === 0x4b && this.place >= 5 ? this.number[this.place - 5] : 0xff);
       this.place++;
     }
   }
   readUint32(offset) { return offset === 0x24 ? this.out.length : offset === 0x60 ? this.out.shift() ?? 0 : 0; }
-  readable() { return this.enabled === 1 && this.xip && this.control === ((31 << 16) | (3 << 8)); }
+  readable() { return this.enabled === 1 && this.xip && this.control1 === 0 && this.baud >= 4 && this.baud % 2 === 0 && this.control === ((31 << 16) | (3 << 8)); }
 }
 
 export class Board {
@@ -42,6 +45,7 @@ export class Board {
 
   // Power is given, or a watchdog begins anew: then its reason and its scratch registers stay.
   power(kept = null, chipReset = 1 << 8) {
+    if (kept && this.mcu.peripherals[0x40010].wdsel !== 0x1fffc) throw new Error('the watchdog leaves parts of the chip as they are');
     const m = this.mcu = new RP2040(), { clock } = m;
     clock.nanosCounter = kept?.nanos ?? 0;
     for (const sensor of this.sensors) if (sensor) sensor.pending = null;
@@ -87,6 +91,8 @@ export class Board {
     });
     m.spi.forEach((spi, bus) => {
       let received = 0;
+      const write = spi.writeUint32.bind(spi);
+      spi.writeUint32 = (offset, value) => { if (offset === 0 && spi.enabled) throw new Error('SSPCR0 is changed while the SPI is on'); write(offset, value); };
       const done = m.clock.createAlarm(() => spi.completeTransmit(received));
       spi.onTransmit = (value) => {
         received = 0;
@@ -117,7 +123,7 @@ export class Board {
   }
 
   lampOn() { return this.mcu.gpio[LAMP].value === 1; }
-  clocksRight() { const m = this.mcu; return m.clkSys === 120e6 && m.clkPeri === 120e6 && m.pllUsb.frequency === 48e6 && (m.clocks.usbCtrl & 0x800) !== 0 && !(this.resets.reset & NEEDED.usb); }
+  clocksRight() { const m = this.mcu; return m.clkSys === 120e6 && m.clkPeri === 120e6 && m.pllUsb.frequency === 48e6 && (m.clocks.usbCtrl & 0x800) !== 0 && m.clocks.refCtrl === 2 && m.peripherals[0x40024].startup * 256 / 12e6 > 1e-3 && !(this.resets.reset & NEEDED.usb); }
   measure() { Object.assign(this, { busyNs: 0, instructions: 0, worstReading: 0, reading: 0, lowestStack: 0x20040000 }); }
 
   // Executes for so long. The stock loop does not let SysTick end WFI.

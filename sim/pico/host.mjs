@@ -15,9 +15,10 @@ export class Host {
     const m = this.board.mcu, usb = this.usb = m.usbCtrl;
     const write = usb.writeUint32.bind(usb), read = usb.readUint32.bind(usb);
     // SUSPENDED is cleared by writing 1, the frame's interrupt by reading its number (data sheet; the stock model lacks both).
-    usb.writeUint32 = (offset, value) => { if (offset === 0x50) usb.sieStatus &= ~(usb.rawWriteValue & 1 << 4); write(offset, value); };
+    usb.writeUint32 = (offset, value) => { if (offset === 0x74) this.muxing = value; if (offset === 0x50) usb.sieStatus &= ~(usb.rawWriteValue & 1 << 4); write(offset, value); };
     usb.readUint32 = (offset) => { if (offset === 0x48) { usb.intRaw &= ~(1 << 17); usb.checkInterrupts(); } return read(offset); };
     this.settling = {};
+    this.muxing = 0;
     usb.DPRAMUpdated = (offset, value) => { if (offset >= 0x80 && offset <= 0xfc) this.armed(offset, value); };
     this.timer = m.clock.createAlarm(() => this.startFrame());
     this.poll = m.clock.createAlarm(() => this.token());
@@ -31,7 +32,7 @@ export class Host {
     this.settling[offset] = { value, at: now };
   }
 
-  connected() { return this.plugged && (this.usb.sieCtrl & 1 << 16) !== 0 && (this.usb.mainCtrl & 3) === 1 && this.board.clocksRight(); }
+  connected() { return this.plugged && (this.usb.sieCtrl & 1 << 16) !== 0 && (this.usb.mainCtrl & 3) === 1 && this.muxing === 9 && (this.usb.usbPwr & 12) === 12 && this.board.clocksRight(); }
   plug() { this.plugged = true; this.timer.schedule(FRAME_NS); }
   unplug() { this.plugged = false; this.timer.cancel(); this.poll.cancel(); this.fail('gone'); }
   fail(why) {

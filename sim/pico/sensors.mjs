@@ -37,7 +37,7 @@ class Sensor {
     if (!this.pending || now < this.pending.at) return;
     this.latest = this.pending.counts;
     this.counts.push(this.latest);
-    if (this.counts.length > 200) this.counts.splice(0, 100);
+    if (this.counts.length > 2000) this.counts.splice(0, 1000);
     this.ready(this.pending.counts);
     this.pending = null;
   }

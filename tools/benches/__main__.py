@@ -36,6 +36,7 @@ TOPICS = {  # topic -> module, by room; the page is last, for its tables show wh
     "nav_peers": "nav.peer_runs",
     "nav_unseen": "nav.unseen",
     "node": "node.bench",
+    "pico": "node.pico",
     "radial": "radial.bench",
     "record": "host.record",
     "ring": "host.ring",
@@ -51,6 +52,7 @@ ROUND = {
     "nav": ["--seeds", "5"],
     "nav_peers": ["--seeds", "5"],
     "nav_unseen": ["--seeds", "10"],
+    "pico": ["--frames", "100000", "--faults", "1000"],
     "ring": ["--rounds", "1"],
     "usb": ["--frames", "500000"],
 }

@@ -39,6 +39,7 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tools/benches nav_peers": (("nav_peers",), ()),
     "tools/benches nav_unseen": (("nav_unseen",), ()),
     "tools/benches node": (("node", "node_cuts", "node_faults"), ()),
+    "tools/benches pico": (("pico",), ()),
     "tools/benches radial": (("radial",), ("radial_fig5",)),
     "tools/benches record": (("record",), ()),
     "tools/benches ring": (("ring",), ()),

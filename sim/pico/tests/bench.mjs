@@ -12,8 +12,8 @@ export const CODE = { ok: 0, starting: 1, resync: 2, late: 3, sum: 4, start: 5, 
 export class Bench {
   constructor(image, sensors, options = {}) {
     this.board = new Board(fs.readFileSync(image), sensors, options);
-    this.board.run(5 * MS);
     this.host = new Host(this.board);
+    this.board.run(5 * MS);
   }
   request(setup, data = new Uint8Array(setup[6]), abandon) {
     let answer;
@@ -110,5 +110,5 @@ for (const kind of [Mlx90393, Tmag5170]) {
   kind.prototype.ready = function (c) { this.finished = (this.finished ?? 0) + 1; ready.call(this, c); };
 }
 
-export function tmags(lanes, options) { return Array.from({ length: 16 }, (_, n) => (n < lanes ? new Tmag5170(wandering(n), options) : null)); }
+export function tmags(lanes, options, seed = 0) { return Array.from({ length: 16 }, (_, n) => (n < lanes ? new Tmag5170(wandering(n + 16 * seed), options) : null)); }
 export function tell(object) { console.log(JSON.stringify(object)); }

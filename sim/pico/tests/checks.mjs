@@ -1,4 +1,5 @@
-// checks.mjs IMAGE [NAME]: what the image does by itself and on the bus, a line of JSON: name and null, or what went wrong.
+// checks.mjs IMAGE [NAME | --first]: what the image does by itself and on the bus, a line of JSON: name and null, or what went wrong;
+// --first: until something does.
 import { Bench, CODE, Judge, MS, decode, tell, tmags } from './bench.mjs';
 import { Mlx90393, Stranger, Tmag5170, wandering } from '../sensors.mjs';
 
@@ -351,9 +352,10 @@ const CHECKS = {
 };
 
 for (const [name, check] of Object.entries(CHECKS)) {
-  if (only && name !== only) continue;
+  if (only && only !== '--first' && name !== only) continue;
   let error = null;
   const began = process.cpuUsage().user;
   try { check(); } catch (thrown) { error = process.env.TRACE ? thrown.stack : thrown.message; }
   tell({ name, error, cpu_s: +((process.cpuUsage().user - began) / 1e6).toFixed(2) });
+  if (error && only === '--first') break;
 }

@@ -32,9 +32,12 @@ function only(found, lane, code, least, most) {
   const keys = Object.keys(found).sort(), n = found[`${lane}:${code}`];
   return JSON.stringify(keys) === JSON.stringify([`${lane}:${CODE.resync}`, `${lane}:${code}`].sort()) && n >= least && n <= most && found[`${lane}:${CODE.resync}`] === 1 ? null : found;
 }
+// As it begins and ends a frame may be cut in two: its sum is wrong.
 function marred(mark, code) {
-  const lane = draw(LANES), ms = 2 + draw(20);
-  return only(since(() => { sensors[lane][mark] = true; bench.board.run(ms * MS); sensors[lane][mark] = false; }, 8), lane, code, 2 * ms - 2, 2 * ms + 2);
+  const lane = draw(LANES), ms = 2 + draw(20), cut = `${lane}:${CODE.sum}`;
+  const found = since(() => { sensors[lane][mark] = true; bench.board.run(ms * MS); sensors[lane][mark] = false; }, 8);
+  if (found[cut] <= 2) delete found[cut];
+  return only(found, lane, code, 2 * ms - 2, 2 * ms + 2);
 }
 
 const KINDS = {

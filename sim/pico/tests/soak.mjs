@@ -1,9 +1,9 @@
-// soak.mjs IMAGE FRAMES [LANES] [PERIOD]: a run of so many frames, each reading held against its sensor. A line every 20 000
+// soak.mjs IMAGE FRAMES [LANES] [PERIOD] [SEED]: a run of so many frames, each reading held against its sensor. A line every 20 000
 // frames, the last one of all.
 import { Bench, Judge, MS, tell, tmags } from './bench.mjs';
 
-const [image, frames, lanes = 8, period = 30000] = process.argv.slice(2);
-const bench = new Bench(image, tmags(+lanes));
+const [image, frames, lanes = 8, period = 30000, seed = 0] = process.argv.slice(2);
+const bench = new Bench(image, tmags(+lanes, {}, +seed));
 const judge = new Judge(bench.board.sensors);
 bench.enumerate();
 bench.board.run(60 * MS);

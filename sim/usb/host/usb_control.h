@@ -30,9 +30,9 @@ Outcome control_transfer(UsbHost &host, const SetupRequest &request, Bytes &data
 struct Descriptors {
     Bytes device;
     Bytes configuration;
-    std::string product, serial; // where they were asked for
-    Bytes all() const;           // as sysfs shows them
-    bool high_speed() const;     // an endpoint has packets that no other speed has
+    std::string product{}, serial{}; // where they were asked for
+    Bytes all() const;               // as sysfs shows them
+    bool high_speed() const;         // an endpoint has packets that no other speed has
 };
 
 // Bus reset, address, descriptors, SET_CONFIGURATION(1). False: some step failed; `error` names it.
