@@ -465,8 +465,10 @@ static void add_place(enum sim_create_spoil spoil, const struct fault *fault, ui
         place.value = place.packet == CREATE_OI_MODE ? whole(4) : whole(65536);
     }
     sim_create_add_fault(create, &place);
-    spoilt_orders =
-        spoil == SIM_CREATE_LOSE_ORDER || spoil == SIM_CREATE_FLIP_ORDER ? place.first + place.count : spoilt_orders;
+    const uint64_t past = place.first + place.count;
+    if ((spoil == SIM_CREATE_LOSE_ORDER || spoil == SIM_CREATE_FLIP_ORDER) && past > spoilt_orders) {
+        spoilt_orders = past;
+    }
 }
 
 /* What begins now. */
