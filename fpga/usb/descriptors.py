@@ -47,7 +47,6 @@ class Build:
     high speed, so there is no other speed to describe (USB 2.0 section 9.6.2); usb_id: vendor and product.
     """
 
-    product: str = "Whisker bridge"
     serial: str = "0001"
     board: int = BOARDS["simulation"]
     commit: int = 0
@@ -55,6 +54,7 @@ class Build:
     milliamps: int = 2
     full_speed_only: bool = False
     usb_id: tuple[int, int] = (LIMITS["usb_vendor_id"], LIMITS["usb_product_id"])
+    product: str = "Whisker bridge"
 
     @property
     def attributes(self) -> int:

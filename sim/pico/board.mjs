@@ -5,7 +5,7 @@ export const SELECT = [5, 16, 6, 17, 7, 18, 8, 19, 9, 20, 13, 21, 14, 26, 15, 27
 export const BUSES = [{ sck: 2, mosi: 3, miso: 4 }, { sck: 10, mosi: 11, miso: 12 }];
 export const CONVERT = 22, LAMP = 25;
 const RAM = 0x20000000, BOOT2_AT = 0x20041f00, FLASH_NUMBER = [0xe6, 0x61, 0x38, 0x52, 0x83, 0x7f, 0x2b, 0x21];
-const IRQ_READING = 16, NEEDED = { io: 1 << 5, pads: 1 << 8, spi0: 1 << 16, spi1: 1 << 17, timer: 1 << 21, usb: 1 << 24 };
+const IRQ_READING = 16, NEEDED = { io: 1 << 5, pads: 1 << 8, spi0: 1 << 16, spi1: 1 << 17, timer: 1 << 21, usb: 1 << 24, plls: 3 << 12 };
 
 // CRC-32 of boot stage 2, bit by bit, as the ROM checks it.
 export function romCrc(bytes) {
@@ -59,6 +59,9 @@ export class Board {
     Object.defineProperty(resets, 'reset_done', { get: () => ~resets.reset & 0x1ffffff });
     if (kept) { watchdog.scratchData.set(kept.scratch); watchdog.reason = kept.reason; }
     watchdog.tickEnable = false;
+    const ticks = watchdog.writeUint32.bind(watchdog);
+    watchdog.writeUint32 = (offset, value) => { if (offset === 0x2c) this.microsecond = (value & 0x3ff) === (12 | 1 << 9); ticks(offset, value); };
+    this.microsecond = false;
     watchdog.onWatchdogTrigger = () => {
       watchdog.timer.enable = false; // the stock model would fire again at once
       this.again = { nanos: clock.nanos, scratch: watchdog.scratchData, reason: watchdog.reason };
@@ -123,7 +126,7 @@ export class Board {
   }
 
   lampOn() { return this.mcu.gpio[LAMP].value === 1; }
-  clocksRight() { const m = this.mcu; return m.clkSys === 120e6 && m.clkPeri === 120e6 && m.pllUsb.frequency === 48e6 && (m.clocks.usbCtrl & 0x800) !== 0 && m.clocks.refCtrl === 2 && m.peripherals[0x40024].startup * 256 / 12e6 > 1e-3 && !(this.resets.reset & NEEDED.usb); }
+  clocksRight() { const m = this.mcu; return this.microsecond && m.clkSys === 120e6 && m.clkPeri === 120e6 && m.pllUsb.frequency === 48e6 && (m.clocks.usbCtrl & 0x800) !== 0 && m.clocks.refCtrl === 2 && m.peripherals[0x40024].startup * 256 / 12e6 > 1e-3 && !(this.resets.reset & (NEEDED.usb | NEEDED.plls)); }
   measure() { Object.assign(this, { busyNs: 0, instructions: 0, worstReading: 0, reading: 0, lowestStack: 0x20040000 }); }
 
   // Executes for so long. The stock loop does not let SysTick end WFI.
