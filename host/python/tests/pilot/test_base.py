@@ -617,7 +617,7 @@ def test_messages_that_are_none_are_refused(start):
         with pytest.raises(BaseError, match="message too long; 255 letters are the most"):
             client._ask("drive 0.2 0." + 300 * "0" + "1e300", "sent", None, print)  # without its end another number
         with pytest.raises(BaseError, match="zero byte"):
-            client._ask("stop\0 drive", "sent", None)
+            client._ask("stop\0 drive", "sent", None, print)
         assert client.drive(0.2, 0.0).v_m_s == 0.2
 
 
