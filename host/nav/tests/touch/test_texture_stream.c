@@ -65,6 +65,7 @@ static void make_model(struct model *m)
     const struct nav_texture_classifier_numbers numbers = {.classes = 2,
                                                            .channels = 1,
                                                            .length = BLOCK,
+                                                           .behind = 0.5,
                                                            .floor = &m->floor,
                                                            .weight = m->weight,
                                                            .bias = m->bias};
@@ -80,7 +81,6 @@ static struct nav_texture_rules rules_of(const struct model *m, int step)
                                       .classifiers = 1,
                                       .classifier = &m->classifier,
                                       .hazard = HAZARD,
-                                      .temper = 0.5,
                                       .doubt = 0.6,
                                       .step = step,
                                       .sure = 0.95,
@@ -336,7 +336,7 @@ static void impossible_rules_make_no_stream(void **state)
     rules[0].classifiers = 2;
     rules[1].window = 1;
     rules[2].hazard = 0.0;
-    rules[3].temper = NAN;
+    rules[3].hazard = NAN;
     rules[4].limits.channels = 2;
     rules[5].step = 8;
     rules[5].patience = 4;

@@ -21,7 +21,7 @@ static void classifier_place(void *of, struct nav_texture_slab *m)
 
 struct nav_texture_classifier *nav_texture_classifier_new(const struct nav_texture_classifier_numbers *n)
 {
-    if (n->classes < 1 || n->classes > NAV_TEXTURE_CLASSES_MAX)
+    if (n->classes < 1 || n->classes > NAV_TEXTURE_CLASSES_MAX || !isfinite(n->behind) || n->behind < 0.0)
         return NULL;
     struct nav_texture_features *reduce = nav_texture_features_new(n->channels, n->length, n->floor, n->shape);
     if (!reduce)
@@ -44,6 +44,11 @@ void nav_texture_classifier_free(struct nav_texture_classifier *r)
 int nav_texture_classifier_length(const struct nav_texture_classifier *r)
 {
     return r->n.length;
+}
+
+double nav_texture_classifier_behind(const struct nav_texture_classifier *r)
+{
+    return r->n.behind;
 }
 
 int nav_texture_classifier_count(const struct nav_texture_classifier *r)

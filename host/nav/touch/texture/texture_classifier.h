@@ -18,6 +18,7 @@ enum { NAV_TEXTURE_CLASSES_MAX = 256 };
 /* A classifier's numbers. F: features, K: classes. All arrays are copied. */
 struct nav_texture_classifier_numbers {
     int classes, channels, length;
+    double behind;               /* >= 0: factor of the evidence of windows behind the first of a row, which err alike */
     const double *floor;         /* [channels] counts squared */
     const double *shape;         /* NULL, or thresholds as in texture_features.h */
     const double *weight, *bias; /* [F][K], [K] */
@@ -36,6 +37,7 @@ const double *nav_texture_classifier_features(const struct nav_texture_classifie
 
 int nav_texture_classifier_count(const struct nav_texture_classifier *); /* of features */
 int nav_texture_classifier_length(const struct nav_texture_classifier *);
+double nav_texture_classifier_behind(const struct nav_texture_classifier *);
 
 #pragma GCC visibility pop
 #ifdef __cplusplus

@@ -69,7 +69,7 @@ static bool stream_numbers_ok(const struct nav_texture_rules *r)
 {
     bool sequential = r->patience >= r->step && r->patience <= NAV_TEXTURE_WINDOW_MAX;
     return r->window >= 2 && r->window <= NAV_TEXTURE_WINDOW_MAX && r->step >= 0 && (r->step == 0 || sequential) &&
-           r->hazard > 0.0 && r->temper >= 0.0 && isfinite(r->hazard) && isfinite(r->temper);
+           r->hazard > 0.0 && isfinite(r->hazard);
 }
 
 static bool stream_novelty_ok(const struct nav_texture_rules *r)
@@ -189,12 +189,13 @@ static bool stream_evidence(struct nav_texture_stream *s, double *loglik, double
         for (int k = 0; k < classes; k++)
             loglik[k] += s->part[k];
     }
-    double best = -INFINITY, filled = (double)n / length, temper = s->rules.temper;
+    double best = -INFINITY, filled = (double)n / length;
+    double behind = nav_texture_classifier_behind(s->classifier[at]);
     for (int k = 0; k < classes; k++)
         best = fmax(best, loglik[k]);
     for (int k = 0; k < classes; k++)
         loglik[k] = (loglik[k] - best) * filled / windows;
-    *factor = s->begun ? temper : (1.0 + temper * (filled - 1.0)) / filled;
+    *factor = s->begun ? behind : (1.0 + behind * (filled - 1.0)) / filled;
     return true;
 }
 

@@ -2,7 +2,7 @@
  *
  * A forward filter over windows in a row gives the probability of each class. Between windows the surface changes with
  * some chance, to each other class alike; a window's evidence then weighs the classes: the first window's whole, that
- * of those behind it by one factor, for windows of one drive err alike. An edge that holds the tip is no evidence, and
+ * of those behind it by the classifier's factor, for windows of one drive err alike. An edge that holds the tip is no evidence, and
  * behind it the surface may be another. Whether the surface was ever trained is a distance of its own
  * (texture_novelty.h), which decides the label and leaves the probabilities alone.
  */
@@ -32,7 +32,6 @@ struct nav_texture_rules {
     struct nav_texture_classifier *const
         *classifier; /* [classifiers] lent for the stream's life; not for use by two threads at a time */
     double hazard;   /* changes of surface per sample, above 0 */
-    double temper;   /* >= 0: factor of the evidence of windows behind the first, which err alike */
     double doubt;    /* probability of a class below which the answer is "unknown" */
     int step;        /* 0: windows in a row. Else sequential: looks every so many samples, ... */
     double sure;     /* ... answers at this probability, ... */
@@ -66,7 +65,7 @@ long nav_texture_stream_push(struct nav_texture_stream *, const double *samples,
 void nav_texture_stream_reset(struct nav_texture_stream *);
 
 /* The filter by itself: the posteriors[rows][classes] after each of so many windows of loglik[rows][classes], each
- * after a change of surface with this chance, from all classes alike; `temper` as in the rules. */
+ * after a change of surface with this chance, from all classes alike; `temper`: factor of all but the first. */
 void nav_texture_filter_run(const double *loglik, size_t rows, int classes, double temper, double chance,
                             double *posterior);
 /* cffi: end */

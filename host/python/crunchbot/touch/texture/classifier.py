@@ -21,11 +21,12 @@ class Classifier:
     shape: np.ndarray  # (shape_count(length),) thresholds, or (0,): without
     weight: np.ndarray  # (F, classes)
     bias: np.ndarray  # (classes,)
+    behind: float = 1.0  # factor of the evidence of windows behind the first of a row
     span: np.ndarray | None = None  # (channels,) counts: the farthest that a window of this length may reach
     _made: object = field(default=None, repr=False, compare=False)
 
     ARRAYS = ("floor", "shape", "weight", "bias")
-    NUMBERS = ("length",)
+    NUMBERS = ("length", "behind")
 
     @property
     def native(self) -> ffi.CData:
@@ -39,7 +40,9 @@ class Classifier:
         shapes = {"floor": self.floor.shape, "bias": self.bias.shape, "weight": (features, len(self.bias))}
         shapes |= {"shape": self.shape.shape} if len(self.shape) else {}
         where, sizes = f"classifier {self.length}", {"classes": len(self.bias), "channels": len(self.floor)}
-        return made("classifier", sizes | {"length": self.length} | pointers(self, where, shapes), where)
+        return made(
+            "classifier", sizes | {n: getattr(self, n) for n in self.NUMBERS} | pointers(self, where, shapes), where
+        )
 
 
 def pointers(part: Any, where: str, shapes: dict[str, tuple]) -> dict:

@@ -77,7 +77,7 @@ class Fitted:
         weight, bias = self.rules[left_out]
         weight = factor * self._scale[:, None] * weight
         bias = factor * bias - self._centre @ weight
-        return Classifier(self.data.windows.shape[1], self.floor, self.shape, weight, bias, span)
+        return Classifier(self.data.windows.shape[1], self.floor, self.shape, weight, bias, span=span)
 
 
 def fit(data: Windows, floor: np.ndarray) -> Fitted:

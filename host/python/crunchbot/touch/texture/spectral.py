@@ -1,4 +1,4 @@
-"""Floor texture, the default method: spectral classifiers of a window and its quarter, from recordings to calibrated decisions."""
+"""Floor texture, the default method: spectral classifiers of a window, its half and its quarter, from recordings to calibrated decisions."""
 
 import json
 from dataclasses import dataclass, field
@@ -24,7 +24,6 @@ LENGTH_MOST = 1 << 20  # samples of a window
 RANGES = {
     "rate_hz": (1e-3, 1e9),
     "window_ms": (1e-3, 1e6),
-    "temper": (0.0, 1.0),
     "doubt": (0.0, 1.0),
     "hazard": (HAZARD_LEAST, 1.0),
 }
@@ -53,7 +52,6 @@ class SpectralModel:
     classifiers: list[Classifier]
     limits: dict[str, np.ndarray]  # spike, still, low, high: (channels,)
     window_ms: float = 100.0
-    temper: float = 1.0  # of the evidence of windows behind the first
     doubt: float = 0.0  # probability of a class below which the answer is "unknown"
     hazard: float = HAZARD  # changes of surface in window_ms
     novelty: Novelty | None = None
@@ -79,7 +77,7 @@ class SpectralModel:
 
     def save(self, path: str | Path) -> None:
         content = {"format": FORMAT, "classes": self.classes, "rate_hz": self.rate_hz, "window_ms": self.window_ms}
-        content |= {name: getattr(self, name) for name in ("temper", "doubt", "hazard", "columns", "figures")}
+        content |= {name: getattr(self, name) for name in ("doubt", "hazard", "columns", "figures")}
         content["limits"] = {name: _listed(self.limits[name]) for name in LIMITS}
         content["novelty"] = None if self.novelty is None else _fields(self.novelty)
         content["classifiers"] = [_fields(r) | {"span": _listed(r.span)} for r in self.classifiers]
@@ -132,7 +130,8 @@ def no_model(path: str | Path, error: Exception) -> TableError:
 
 def _classifier(fields: Fields) -> Classifier:
     flat = {name: fields.array(name, 1) for name in ("floor", "shape", "bias", "span")}
-    return Classifier(length=fields.whole("length", 1, LENGTH_MOST), weight=fields.array("weight", 2), **flat)
+    length, behind = fields.whole("length", 1, LENGTH_MOST), fields.number("behind", 0.0, 1.0)
+    return Classifier(length=length, behind=behind, weight=fields.array("weight", 2), **flat)
 
 
 def _novelty(fields: Fields) -> Novelty:
@@ -156,7 +155,7 @@ class Stream:
         }
         rules |= {"window": window, "step": step, "patience": patience, "sure": SURE}
         rules["novelty"] = self._novelty
-        rules |= {name: getattr(model, name) for name in ("temper", "doubt")}
+        rules["doubt"] = model.doubt
         rules["hazard"] = 1000.0 * model.hazard / (model.window_ms * model.rate_hz)
         if model.novelty is not None:
             rules["novelty_classifier"] = [c.length for c in model.classifiers].index(model.novelty.length)

@@ -19,7 +19,7 @@ from .spectral import HAZARD, SENSOR_STOPS, Judgement, SpectralModel, forward
 
 FOLDS = 10  # or as many as there are recordings
 PIECES = 5  # that the one recording of a surface is cut into
-QUARTER = 4  # of a window, for answers as soon as sure
+PARTS = (4, 2, 1)  # of a window, that there are classifiers of: for answers as soon as sure, and shorter windows
 LENGTH_LEAST, LENGTH_MOST = 4, 1024  # samples of a classifier
 WINDOWS_MOST = 6000  # of one classifier, over all recordings
 SPIKE_OVER = 3.0  # times what one sample in a thousand stands out from both neighbours
@@ -65,7 +65,7 @@ class Learnt:
             max(len(p) for p, k in zip(self.parts, self.labels, strict=True) if k == c) for c in set(self.labels)
         ]
         self.window, self.length = min(asked, *longest), min(asked, LENGTH_MOST, shortest)
-        lengths = sorted({max(LENGTH_LEAST, self.length // QUARTER), self.length})
+        lengths = sorted({max(LENGTH_LEAST, self.length // part) for part in PARTS})
         floor = _floor(self.parts)
         self._fitted = []
         for length in lengths:
@@ -75,8 +75,10 @@ class Learnt:
         self._spans = {length: [_widest(part, length) for part in self.parts] for length in lengths}
         self._learn_distances(floor)
         twins = {f: self._plain(f) for f in set(self.folds)}
-        of = zip(self.parts, self.folds, strict=True)
-        self._rows = [self._said(twins[f].judge(part, self.window)) for part, f in of]
+        self._rows = {}  # by length of a window: of each recording, by the twin that has not seen it
+        for length in {*lengths, self.window}:
+            of = zip(self.parts, self.folds, strict=True)
+            self._rows[length] = [self._said(twins[f].judge(part, length)) for part, f in of]
 
     def _windows(self, length: int) -> Windows:
         """Half overlapping windows of all recordings, thinned evenly to at most WINDOWS_MOST."""
@@ -121,15 +123,26 @@ class Learnt:
     def model(self, left_out: int | None = None) -> SpectralModel:
         """Of all recordings, or of all but those of a fold."""
         made, kept = self._plain(left_out), self._kept(left_out)
-        rows = [(self._rows[n], self.labels[n]) for n in kept if len(self._rows[n])]
-        chance = -float(np.expm1(-1000.0 * self.hazard * self.window / (self.window_ms * self.rate_hz)))
-        made.temper = min(1.0, most_probable(lambda w: _loss_behind(rows, w, chance), BEHIND, BEHIND_SPREAD))
-        sure = [-forward(loglik, made.temper, chance).max(axis=1) for loglik, _ in rows]
+        for classifier in made.classifiers:
+            rows, chance = self._rows_of(classifier.length, kept)
+            classifier.behind = self._behind(rows, chance)
+        rows, chance = self._rows_of(self.window, kept)
+        behind = made.classifiers[-1].behind
+        sure = [-forward(loglik, behind, chance).max(axis=1) for loglik, _ in rows]
         made.doubt = min(DOUBT, -conformal(sure, REFUSE_DOUBT)) if sure else 0.0
         if self._distances is not None:
             limit = conformal([self._distances[n] for n in kept if len(self._distances[n])], REFUSE_NOVEL)
             made.novelty = replace(self._novelty[left_out], limit=limit)
         return made
+
+    def _rows_of(self, length: int, kept: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float]:
+        """Log-likelihoods of windows in a row with their class, of the recordings kept, and the chance of a change between two."""
+        rows = [(self._rows[length][n], self.labels[n]) for n in kept if len(self._rows[length][n])]
+        return rows, -float(np.expm1(-1000.0 * self.hazard * length / (self.window_ms * self.rate_hz)))
+
+    @staticmethod
+    def _behind(rows: list[tuple[np.ndarray, int]], chance: float) -> float:
+        return min(1.0, most_probable(lambda weight: _loss_behind(rows, weight, chance), BEHIND, BEHIND_SPREAD))
 
     def held_out(self, sequential: bool = False) -> list[tuple[int, Judgement]]:
         """Each decision on each recording by the model that has not seen it, with the recording's class."""
