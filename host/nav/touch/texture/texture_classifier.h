@@ -18,9 +18,9 @@ enum { NAV_TEXTURE_CLASSES_MAX = 256 };
 /* A classifier's numbers. F: features, K: classes. All arrays are copied. */
 struct nav_texture_classifier_numbers {
     int classes, channels, length;
-    double behind;               /* >= 0: factor of the evidence of windows behind the first of a row, which err alike */
-    const double *floor;         /* [channels] counts squared */
-    const double *shape;         /* NULL, or thresholds as in texture_features.h */
+    double behind;       /* >= 0: factor of the evidence of windows behind the first of a row, which err alike */
+    const double *floor; /* [channels] counts squared */
+    const double *shape; /* NULL, or thresholds as in texture_features.h */
     const double *weight, *bias; /* [F][K], [K] */
 };
 

@@ -71,7 +71,7 @@ static void novelty_take(struct nav_texture_novelty *v, const double *features)
 
 static double novelty_distance(const struct nav_texture_novelty *v, int class)
 {
-    const double *mean = v->n.mean + (size_t)class * (size_t)v->n.features;
+    const double *mean = v->n.mean + (size_t) class * (size_t)v->n.features;
     double sum = 0.0, noise = 1.0 / v->windows;
     for (int f = 0; f < v->n.features; f++) {
         double apart = v->sum[f] - mean[f];

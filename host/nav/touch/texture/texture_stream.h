@@ -2,8 +2,8 @@
  *
  * A forward filter over windows in a row gives the probability of each class. Between windows the surface changes with
  * some chance, to each other class alike; a window's evidence then weighs the classes: the first window's whole, that
- * of those behind it by the classifier's factor, for windows of one drive err alike. An edge that holds the tip is no evidence, and
- * behind it the surface may be another. Whether the surface was ever trained is a distance of its own
+ * of those behind it by the classifier's factor, for windows of one drive err alike. An edge that holds the tip is no
+ * evidence, and behind it the surface may be another. Whether the surface was ever trained is a distance of its own
  * (texture_novelty.h), which decides the label and leaves the probabilities alone.
  */
 #ifndef NAV_TEXTURE_STREAM_H
