@@ -84,7 +84,10 @@ bool nav_particles_draw(const struct nav_likelihood *l, const struct nav_prior *
 {
     for (int n = 0; n < TRIES; n++) {
         *pose = particles_draw_once(l->arena, prior, anywhere, rng);
-        if (nav_likelihood_clear(l, pose->x, pose->y, 0.0))
+        if (!nav_likelihood_clear(l, pose->x, pose->y, 0.0))
+            continue;
+        double share = prior->uniform ? nav_likelihood_prior(l, pose->x, pose->y) : 1.0;
+        if (share >= 1.0 || nav_rng_uniform(rng) < share)
             return true;
     }
     return false;

@@ -28,7 +28,8 @@ struct maker {
     struct nav_expected *e;
     const struct nav_likelihood *likelihood;
     struct nav_book book;
-    uint8_t *codes; /* scratch: 1 for a free pose, then [whiskers] */
+    uint8_t
+        *codes; /* scratch: 1 for a free pose, then [whiskers], then 1 for ground that is not mapped, where any is */
 };
 
 /* All headings of one place: whether it is free does not depend on the heading. */
@@ -39,12 +40,15 @@ static int expected_survey(struct maker *m, int i, int j)
     /* Half a step of grace: the robot may well stand against a wall, between two lattice poses. */
     if (!nav_likelihood_clear(m->likelihood, x, y, e->step / 2.0))
         return 0;
+    double prior = nav_likelihood_prior(m->likelihood, x, y);
+    if (m->likelihood->arena->unknown > 0)
+        m->codes[1 + e->whiskers] = prior < 1.0;
     size_t at = (size_t)(j + e->margin) * expected_pitch(e) + (size_t)(i + e->margin);
     for (int k = 0; k < e->nh; k++, at += expected_pitch(e) * (size_t)(e->ny + 2 * e->margin)) {
         double theta = (k + 0.5) * e->step_theta;
         nav_likelihood_expect(m->likelihood, &(struct nav_place){x, y, cos(theta), sin(theta)}, m->codes + 1);
         e->signature[at] = nav_book_number(&m->book, m->codes);
-        e->standing += 1.0 / ((double)e->nh * e->ny * e->nx);
+        e->standing += prior / ((double)e->nh * e->ny * e->nx);
         if (e->signature[at] == NAV_BOOK_FULL)
             return -1;
     }
@@ -70,9 +74,10 @@ static int expected_survey_all(struct maker *m)
 
 /* At least two: the root of a tree of products must be a product, whose stretches are numbered as the signatures are.
  */
-static size_t expected_code_width(int whiskers)
+static size_t expected_code_width(const struct nav_likelihood *l)
 {
-    return whiskers > 2 ? (size_t)whiskers : 2;
+    int factors = l->whiskers + (l->arena->unknown > 0);
+    return factors > 2 ? (size_t)factors : 2;
 }
 
 /* Takes the signatures over from the book, whose keys begin with the byte for free or blocked. */
@@ -90,7 +95,7 @@ static int expected_keep_codes(struct nav_expected *e, const struct nav_book *bo
 static int expected_make_factor(struct nav_expected *e, const struct nav_book *book,
                                 const struct nav_likelihood *likelihood)
 {
-    size_t width = expected_code_width(e->whiskers), count = e->signatures - 1;
+    size_t width = expected_code_width(likelihood), count = e->signatures - 1;
     uint8_t *packed = calloc(count + 1, width);
     int *codes = calloc(width, sizeof *codes), failed = -1;
     if (packed && codes) {
@@ -100,6 +105,8 @@ static int expected_make_factor(struct nav_expected *e, const struct nav_book *b
             codes[w] = 1;
         for (int w = 0; w < e->whiskers; w++)
             codes[w] = likelihood->model[w].codes;
+        if (likelihood->arena->unknown > 0)
+            codes[e->whiskers] = 2;
         failed = nav_factor_init(&e->factor, packed, (uint32_t)count, (int)width, codes);
     }
     free(packed);
@@ -136,9 +143,10 @@ struct nav_expected *nav_expected_new(const struct nav_likelihood *likelihood, d
                                .step_theta = 2.0 * NAV_PI / (headings * turns),
                                .sub = sub,
                                .turns = turns,
+                               .unmapped = 1.0,
                                .whiskers = likelihood->whiskers};
     struct maker m = {.e = e, .likelihood = likelihood};
-    m.book.width = expected_code_width(e->whiskers) + 1;
+    m.book.width = expected_code_width(likelihood) + 1;
     int failed = expected_survey_all(&m) || expected_keep_codes(e, &m.book) ||
                  expected_make_factor(e, &m.book, likelihood) || expected_make_values(e);
     free(m.codes);
@@ -182,7 +190,8 @@ static void expected_evaluate_leaves(struct nav_expected *e, const float *const 
         if (node->whisker < e->whiskers)
             expected_evaluate_leaf(e, node, table[node->whisker]);
         else
-            node->value[0] = 1.0;
+            for (uint32_t k = 0; k < node->count; k++)
+                node->value[k] = k == 0 ? 1.0 : e->unmapped;
     }
 }
 

@@ -26,7 +26,8 @@ struct nav_expected {
     struct nav_factor factor;
     float *value;            /* [signatures] likelihood of the present row; negative: not yet worked out */
     uint32_t *known, knowns; /* those worked out */
-    double standing;         /* share of the lattice's poses that are free */
+    double unmapped;         /* factor of ground that is not mapped: the prior's while a belief is uniform, else 1 */
+    double standing;         /* share of the lattice's poses that are free, those that are not mapped by their prior */
 };
 
 /* Cells of an edge and so many headings, each with sub * sub * turns poses. NULL: no memory, or a lattice of more than

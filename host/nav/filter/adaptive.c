@@ -173,7 +173,7 @@ static void *adaptive_create(const struct nav_problem *problem)
     a->problem = problem;
     nav_rng_seed(&rng, problem->seed, 1);
     a->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
-    if (!a->likelihood || adaptive_global_init(&a->global, problem) || adaptive_init_cloud(a) ||
+    if (!a->likelihood || adaptive_global_init(&a->global, problem, &a->likelihood->ground) || adaptive_init_cloud(a) ||
         adaptive_gaussian_init(&a->gaussian, problem, a->likelihood) ||
         adaptive_log_init(&a->log, &a->likelihood->sensors) || adaptive_kidnap_init(&a->kidnap, a->likelihood, &rng)) {
         adaptive_destroy(a);

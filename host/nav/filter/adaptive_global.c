@@ -186,6 +186,7 @@ static void global_begin(struct adaptive_global *g, struct adaptive_log *log)
     g->first.slice = -1;
     g->job.uniform = h->uniform;
     g->job.reference = global_best(g);
+    g->expected->unmapped = h->uniform ? g->likelihood->ground.weight : 1.0;
     if (first)
         nav_expected_begin(g->expected, (const float *const *)g->factor, (float)(BLOCKED * exp(-g->job.reference)));
     g->weigh = (struct nav_weigh){.group = first ? global_look_up : global_work_out,
@@ -419,7 +420,7 @@ static int global_first_level(const struct adaptive_global *g, const struct nav_
     for (int level = 0; level < LEVELS; level++) {
         struct nav_shape shape = nav_levels_shape(levels, level);
         double cells = nav_shape_inside(&shape);
-        if (cells <= fmin(few, CELLS_MOST) || (2.0 * shape.cell > detail / 2.0 && cells <= CELLS_MOST))
+        if ((g->open * cells <= few && cells <= CELLS_MOST) || (2.0 * shape.cell > detail / 2.0 && cells <= CELLS_MOST))
             return level;
     }
     return LEVELS;
@@ -430,7 +431,7 @@ static double global_budget(const struct adaptive_global *g, const struct nav_le
 {
     const struct nav_settings *s = &g->problem->settings;
     struct nav_shape shape = nav_levels_shape(levels, g->first.level);
-    return fmax(g->budget, fmin(nav_shape_inside(&shape) / s->adaptive.rows, s->adaptive.detail_budget));
+    return fmax(g->budget, fmin(g->open * nav_shape_inside(&shape) / s->adaptive.rows, s->adaptive.detail_budget));
 }
 
 static int global_tables(struct adaptive_global *g)
@@ -458,11 +459,11 @@ static double global_room(const struct nav_settings *s)
     return floor(fmax(fmin(s->adaptive.most, s->adaptive.budget / 10.0), 16.0));
 }
 
-int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem)
+int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem, const struct nav_ground *ground)
 {
     struct nav_levels levels;
     double detail;
-    *g = (struct adaptive_global){.problem = problem, .room = global_room(&problem->settings)};
+    *g = (struct adaptive_global){.problem = problem, .room = global_room(&problem->settings), .open = ground->open};
     if (global_levels(g, &levels, &detail))
         return -1;
     g->first.level = global_first_level(g, &levels, detail);

@@ -52,6 +52,7 @@ struct adaptive_global {
     struct nav_weigh weigh;
     struct adaptive_first first;
     double wanted;  /* m, edge of a cell that the scene's detail asks for */
+    double open;    /* share of the cells that can hold mass: the ground's */
     double budget;  /* cells and hypotheses touched per row, at most */
     float **factor; /* [whiskers][codes] log-likelihood of the present job */
     struct adaptive_job job;
@@ -65,7 +66,7 @@ struct adaptive_global {
 };
 
 /* 0, or -1 without memory; adaptive_global_free either way. */
-int adaptive_global_init(struct adaptive_global *, const struct nav_problem *);
+int adaptive_global_init(struct adaptive_global *, const struct nav_problem *, const struct nav_ground *);
 void adaptive_global_free(struct adaptive_global *);
 
 /* Forgets everything: uniform before row `row` of the log. */

@@ -12,7 +12,8 @@ static struct nav_pose kidnap_draw(const struct nav_likelihood *l, struct nav_rn
     for (int n = 0; n < TRIES; n++) {
         pose = (struct nav_pose){l->arena->size_x * nav_rng_uniform(rng), l->arena->size_y * nav_rng_uniform(rng),
                                  2.0 * NAV_PI * nav_rng_uniform(rng)};
-        if (nav_likelihood_clear(l, pose.x, pose.y, 0.0))
+        double prior = nav_likelihood_clear(l, pose.x, pose.y, 0.0) ? nav_likelihood_prior(l, pose.x, pose.y) : 0.0;
+        if (prior >= 1.0 || (prior > 0.0 && nav_rng_uniform(rng) < prior))
             break;
     }
     return pose;

@@ -111,10 +111,19 @@ static void grid_summarise(struct grid *g)
     g->near = nav_histogram_mode(&g->histogram, &g->mean);
 }
 
+/* Likelihoods of the row last read, for a belief that is uniform or not. */
+static void grid_expect(struct grid *g, bool uniform)
+{
+    g->expected->unmapped = uniform ? g->likelihood->ground.weight : 1.0;
+    nav_expected_begin(g->expected, (const float *const *)g->likelihood->table, 0.0f);
+    nav_expected_scale(g->expected);
+}
+
 /* Spreads the belief over free space, by what the present row says. */
 static void grid_forget(struct grid *g)
 {
     g->sure = false;
+    grid_expect(g, true);
     nav_histogram_restart(&g->histogram, 0);
     grid_reweigh(g, (struct nav_pose){0.0, 0.0, 0.0}, 0.0);
 }
@@ -124,8 +133,7 @@ static void grid_begin(struct grid *g)
 {
     const struct nav_prior *prior = &g->problem->prior;
     g->mean = prior->mean;
-    nav_expected_begin(g->expected, (const float *const *)g->likelihood->table, 0.0f);
-    nav_expected_scale(g->expected);
+    grid_expect(g, prior->uniform);
     if (!prior->uniform)
         nav_mixture_fill(prior, &g->histogram);
     if (!grid_reweigh(g, (struct nav_pose){0.0, 0.0, 0.0}, 0.0))
@@ -204,8 +212,7 @@ static void grid_update(void *self, const struct nav_evidence *evidence)
     g->mean = nav_compose(g->mean, step);
     g->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
     nav_likelihood_read(g->likelihood, evidence);
-    nav_expected_begin(g->expected, (const float *const *)g->likelihood->table, 0.0f);
-    nav_expected_scale(g->expected);
+    grid_expect(g, false);
     nav_trust_begin(g->likelihood);
     if (!grid_reweigh(g, step, g->problem->settings.grid.teleport / nav_shape_inside(&g->histogram.shape)))
         grid_forget(g);

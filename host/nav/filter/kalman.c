@@ -146,8 +146,8 @@ static void kalman_linearise_points(struct nav_kalman *k, const struct nav_kalma
         for (int a = 0; a < 3; a++)
             d[n][a] = (n % 2 ? -sqrt(3.0) : sqrt(3.0)) * root[3 * a + n / 2];
         value[n] = kalman_expect(k, s, kalman_shifted(k->belief.mean, d[n]));
-        if (!isfinite(value[n]))
-            value[n] = s->reach; /* nothing within reach is at least that far */
+        if (isinf(value[n]) || s->normal)
+            value[n] = isfinite(value[n]) ? value[n] : s->reach; /* nothing within reach is at least that far */
         out->expected += value[n] / POINTS;
     }
     for (int n = 0; n < POINTS; n++) {

@@ -4,6 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Cells from which contacts are counted, of an arena with ground that was never mapped: a share of a tenth is then
+ * known to a twentieth of itself. */
+enum { SURVEYED = 40000 };
+
 static int likelihood_tables(struct nav_likelihood *l)
 {
     for (int w = 0; w < l->whiskers; w++) {
@@ -14,6 +18,32 @@ static int likelihood_tables(struct nav_likelihood *l)
             return -1;
     }
     return 0;
+}
+
+/* Counts contacts from the mapped cells of the ground, at headings that have nothing to do with one another. */
+static void likelihood_survey(struct nav_likelihood *l)
+{
+    const double golden = NAV_PI * (3.0 - sqrt(5.0));
+    const struct nav_ground *g = &l->ground;
+    for (int w = 0; w < l->whiskers; w++) {
+        struct nav_model *model = &l->model[w];
+        double sum = 0.0, count = 0.0, ghost = model->settings->radial.ghost;
+        for (int n = 0; model->kind->distance && n < g->columns * g->rows; n += 1 + g->columns * g->rows / SURVEYED) {
+            struct nav_place at = {(n % g->columns + 0.5) / g->per_m, (n / g->columns + 0.5) / g->per_m,
+                                   cos(golden * n), sin(golden * n)};
+            struct nav_arena near;
+            uint8_t code;
+            if (g->state[n] != NAV_GROUND_MAPPED)
+                continue;
+            bool any = nav_obstacles_near(&l->obstacles, at.x, at.y, &near);
+            model->kind->expect(model, 1, l->arena, any ? &near : NULL, &at, &code);
+            if (code == model->codes - 1)
+                continue;
+            sum += model->noticed[code] + (1.0 - model->noticed[code]) * ghost;
+            count += 1.0;
+        }
+        model->met = count > 0.0 ? sum / count : 0.0;
+    }
 }
 
 struct nav_likelihood *nav_likelihood_new(const struct nav_arena *arena, const struct nav_robot *robot,
@@ -36,10 +66,12 @@ struct nav_likelihood *nav_likelihood_new(const struct nav_arena *arena, const s
     l->read = calloc(whiskers, sizeof *l->read);
     failed = nav_map_init(&l->map, arena, whiskers) || failed;
     if (failed || !l->scratch || !l->read || !l->table || !l->ratio || !l->weight || !l->trust ||
-        likelihood_tables(l) || nav_obstacles_init(&l->obstacles, arena, nav_sensors_reach(&l->sensors, robot))) {
+        likelihood_tables(l) || nav_obstacles_init(&l->obstacles, arena, nav_sensors_reach(&l->sensors, robot)) ||
+        nav_ground_init(&l->ground, &l->obstacles, robot->body_radius)) {
         nav_likelihood_free(l);
         return NULL;
     }
+    likelihood_survey(l);
     return l;
 }
 
@@ -55,6 +87,7 @@ void nav_likelihood_free(struct nav_likelihood *l)
     }
     nav_sensors_free(&l->sensors);
     nav_obstacles_free(&l->obstacles);
+    nav_ground_free(&l->ground);
     nav_map_free(&l->map);
     free(l->table);
     free(l->ratio);
@@ -130,7 +163,13 @@ void nav_likelihood_expect(const struct nav_likelihood *l, const struct nav_plac
 
 bool nav_likelihood_clear(const struct nav_likelihood *l, double x, double y, double grace)
 {
-    return nav_obstacles_clear(&l->obstacles, x, y, fmax(l->robot->body_radius - grace, 0.0));
+    return nav_obstacles_clear(&l->obstacles, x, y, fmax(l->robot->body_radius - grace, 0.0)) &&
+           nav_likelihood_prior(l, x, y) > 0.0;
+}
+
+double nav_likelihood_prior(const struct nav_likelihood *l, double x, double y)
+{
+    return nav_ground_prior(&l->ground, &l->obstacles, x, y);
 }
 
 float nav_likelihood_at(const struct nav_likelihood *l, const struct nav_place *at, uint8_t *codes)

@@ -24,7 +24,10 @@ void nav_likelihood_read(struct nav_likelihood *, const struct nav_evidence *);
 /* What each sensor should meet at a place: codes[whiskers]. */
 void nav_likelihood_expect(const struct nav_likelihood *, const struct nav_place *, uint8_t *codes);
 
-/* Whether the robot can stand at (x, y), its body taken `grace` m smaller. */
+/* Prior of standing at a clear place by that of one on mapped ground: ground.h. */
+double nav_likelihood_prior(const struct nav_likelihood *, double x, double y);
+
+/* Whether the robot can stand at (x, y), its body taken `grace` m smaller, and can have come there. */
 bool nav_likelihood_clear(const struct nav_likelihood *, double x, double y, double grace);
 
 /* Log-likelihood of the row last read at a place: the sum over sensors (conditionally independent given the pose, as in

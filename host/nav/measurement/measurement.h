@@ -40,6 +40,7 @@ struct nav_model {
     double sigma;                    /* m, of a measured distance, the spread of a pose's cell included */
     double edge;                     /* m, of the end of reach, likewise */
     double *noticed;                 /* object whiskers: [codes] share of contacts that are noticed */
+    double met;                      /* object whiskers: share of contacts on mapped ground; 0: all ground is mapped */
     double temper;                   /* texture whiskers: exponent on a window's likelihood */
     double gap;                      /* running median of log-likelihood between best class and second, 0: none seen */
     double accuracy;                 /* share of windows whose best class is right, as far as is known; 0: not known */

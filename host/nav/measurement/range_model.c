@@ -1,6 +1,7 @@
 /* Contact distances: noticed with a probability that falls off around the whisker's length, then Gaussian (the paper);
- * ghosts are spread evenly over the whisker; "no contact" is what is left over. A broken whisker's distances are taken
- * as ghosts are, 1 / length, and its silence as certain. */
+ * ghosts are spread evenly over the whisker; "no contact" is what is left over. On ground that was never mapped there
+ * are as many contacts as on that which was, spread as evenly. A broken whisker's distances are taken as ghosts are, 1
+ * / length, and its silence as certain. */
 #include "measurement.h"
 
 #include <math.h>
@@ -130,7 +131,9 @@ static void range_fill(struct nav_model *model, const double *reading, double *r
             p = model->length * hit * range_density(model, reading[0] - (k + 0.5) * model->step) + (1.0 - hit) * ghost;
         ratio[k] = fmax(p, LEAST);
     }
-    ratio[model->codes - 1] = 1.0;
+    /* Ground that nobody mapped is as full as what is mapped; as any ghost's a distance is as likely as another. */
+    double met = isfinite(reading[0]) ? model->met : 1.0 - model->met;
+    ratio[model->codes - 1] = model->met > 0.0 ? met : 1.0;
 }
 
 const struct nav_measurement NAV_RANGE_MEASUREMENT = {.name = "range",

@@ -6,6 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "ground.h"
 #include "measurement.h"
 #include "obstacles.h"
 
@@ -59,6 +60,7 @@ struct nav_likelihood {
     int whiskers;            /* how many sensors there are, and */
     struct nav_model *model; /* [whiskers] their models: as in `sensors` */
     struct nav_obstacles obstacles;
+    struct nav_ground ground;
     float **table;                /* [whiskers][codes] log-likelihoods of the present row, weight and trust applied */
     double **ratio;               /* [whiskers][codes] what the models gave, see measurement.h */
     double *weight;               /* [whiskers] of the present row */

@@ -45,7 +45,7 @@ static double trust_surprise(const struct nav_likelihood *l, int w)
 {
     const struct nav_trust *t = &l->trust[w];
     double known = 0.0, ratio = 0.0;
-    for (int k = 0; k < t->codes; k++) {
+    for (int k = 0; k < t->codes - 1; k++) { /* what is not known is no reason to doubt a whisker */
         known += t->predicted[k];
         ratio += t->predicted[k] * l->ratio[w][k];
     }

@@ -25,7 +25,7 @@ static void begin(struct belief *b, double size)
     b->problem.arena.boxes = 0;
     b->problem.arena.size_x = b->problem.arena.size_y = size;
     b->problem.robot.body_radius = 0.01;
-    assert_int_equal(adaptive_global_init(&b->g, &b->problem), 0);
+    assert_int_equal(adaptive_global_init(&b->g, &b->problem, &(struct nav_ground){.open = 1.0}), 0);
     assert_int_equal(adaptive_log_init(&b->log, &b->g.likelihood->sensors), 0);
 }
 
@@ -178,7 +178,7 @@ static void cells_without_a_table_are_weighed_as_those_with_one(void **state)
     for (int n = 0; n < 2; n++) {
         struct belief *b = &belief[n];
         b->problem = wander_new(0).problem;
-        assert_int_equal(adaptive_global_init(&b->g, &b->problem), 0);
+        assert_int_equal(adaptive_global_init(&b->g, &b->problem, &(struct nav_ground){.open = 1.0}), 0);
         assert_int_equal(adaptive_log_init(&b->log, &b->g.likelihood->sensors), 0);
         b->g.first.level = n; /* the second takes its cells, those of level 0, for finer than the table's */
         write(b, NO_NOISE, texture);
