@@ -18,8 +18,8 @@ import numpy as np
 
 from crunchbot.recording.mcapfile import McapFile
 from crunchbot.recording.writing import TopicWriter
+from crunchbot.robot.bags.played import RECORD, SCENE_FILES
 from crunchbot.robot.network.messages import SCHEMAS, decode, type_of
-from crunchbot.robot.played import RECORD, SCENE_FILES
 from crunchbot.scene import load
 from crunchbot_lab.demo.training import flat
 from crunchbot_lab.scenes.files import write_scene

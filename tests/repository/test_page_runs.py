@@ -116,6 +116,7 @@ REASONS = {
         "whisker view robot-run/robot.mcap",  # host/python/tests/view/test_view_playback.py
         "whisker-base --port /tmp/create --socket base.sock",  # host/python/tests/pilot/test_base_emulator.py
         "whisker scene from build/demo --out scenes/demo",  # lab/tests/scenes/test_scenes.py reads a smaller run
+        "whisker scene from rosbag2_2026_11_28 --scene SCENE --out scenes/run",  # host/python/tests/robot/bags/test_robot_rosbags.py
     ),
     "needs a person who sets contacts; tests/chain/test_calibrate_chain.py has a post in their place": (
         "whisker calibrate --out calibration --lane 2 --radii 90,100,110,120,130",

@@ -9,7 +9,7 @@ from chainrun import ROOT
 
 from crunchbot import __version__
 from crunchbot.recording.reading import FORMAT as RECORDING
-from crunchbot.robot.played import FORMAT as BAG
+from crunchbot.robot.bags.played import FORMAT as BAG
 from crunchbot.touch.texture.spectral import FORMAT as TEXTURE
 from whisker_protocol import LIMITS, WIRE_VERSION
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from crunchbot.errors import UserError
 from crunchbot.nav.observations import Observations, observations_path, read_observations
+from crunchbot.robot.bags.rows import is_bag, read_bag
 from crunchbot.scene import Prior, Scene, load
 
-from .bags import is_bag, read_bag
 from .files import rounded
 from .thymio import is_thymio, read_thymio
 

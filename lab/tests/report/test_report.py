@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from crunchbot.recording.writing import TopicWriter
+from crunchbot.robot.bags.played import RECORD
 from crunchbot.robot.network.messages import SCHEMAS, Belief, Header, Time, encode
-from crunchbot.robot.played import RECORD
 from crunchbot_lab.report import figures, html, motion, origin, write_report
 from crunchbot_lab.report.run import FILTERS, Run
 

@@ -1,4 +1,4 @@
-"""`whisker bag`: everything a robot's processes say, in an MCAP file for ROS 2 tools (crunchbot.robot.bag)."""
+"""`whisker bag`: everything a robot's processes say, in an MCAP file for ROS 2 tools (crunchbot.robot.bags.writing)."""
 
 import argparse
 from pathlib import Path
@@ -7,9 +7,9 @@ from .. import scene as scenes
 from ..arguments import add_output
 from ..outputs import claim, next_free
 from ..recording.writing import TopicWriter
-from ..robot.bag import Bag, metadata
+from ..robot.bags.played import RECORD
+from ..robot.bags.writing import Bag, metadata
 from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
-from ..robot.played import RECORD
 from ..stopping import stop_on_signals
 
 EXAMPLE = "whisker bag run.mcap --scene robot-run/scene"

@@ -11,8 +11,8 @@ from pathlib import Path
 from ..arguments import add_ring_owner, add_topics, add_zenoh_config
 from ..errors import UserError
 from ..guard import add_door, may_set_pose, warn_if_open
-from ..robot.played import read_bag
-from ..robot.topic_rows import read_by_table
+from ..robot.bags.played import read_bag
+from ..robot.bags.topic_rows import read_by_table
 from ..scene import load
 from ..stopping import listen
 from .hub import Hub

@@ -4,8 +4,8 @@ import time
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 
+from ..robot.bags.played import Played, Said
 from ..robot.network.messages import HEALTH
-from ..robot.played import Played, Said
 from .robot import PATH_MOST
 from .robot_source import NoRobot
 

@@ -22,8 +22,8 @@ from crunchbot.recording import RecordingError, read
 from crunchbot.recording.mcapfile import MAGIC, McapFile
 from crunchbot.recording.messages import encode_block
 from crunchbot.recording.writing import RecordingWriter, TopicWriter
+from crunchbot.robot.bags.played import RECORD
 from crunchbot.robot.network.messages import SCHEMAS, Header, Pose, PoseStamped, Time, encode
-from crunchbot.robot.played import RECORD
 
 PAGE = 4096
 SECOND_NS = 10**9

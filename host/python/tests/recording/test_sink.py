@@ -16,10 +16,10 @@ from crunchbot.recording import read
 from crunchbot.recording import writing as writing_module
 from crunchbot.recording.recorder import Recorder
 from crunchbot.recording.writing import RecordingWriter, TopicWriter, WriteError
-from crunchbot.robot.bag import Bag
+from crunchbot.robot.bags.played import RECORD
+from crunchbot.robot.bags.writing import Bag
 from crunchbot.robot.network import messages as m
 from crunchbot.robot.network.link import Link
-from crunchbot.robot.played import RECORD
 
 
 def eventually(condition) -> None:

@@ -17,13 +17,13 @@ from crunchbot.nav import localise
 from crunchbot.observation import Row
 from crunchbot.occupancy import from_map, read_map, spread_on_map, to_map
 from crunchbot.recording.writing import TopicWriter
-from crunchbot.robot.bag import Bag, metadata
+from crunchbot.robot.bags.played import RECORD, read_bag
+from crunchbot.robot.bags.writing import Bag, metadata
 from crunchbot.robot.network import initial_pose
 from crunchbot.robot.network import messages as m
 from crunchbot.robot.network.inbox import Received
 from crunchbot.robot.network.rows import to_message
 from crunchbot.robot.network.streams import Envelope
-from crunchbot.robot.played import RECORD, read_bag
 from crunchbot.robot.standard.view import StandardView
 from crunchbot.scene import Prior
 from crunchbot.view.hub import Hub, RequestError

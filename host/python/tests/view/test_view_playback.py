@@ -12,10 +12,10 @@ from viewrobot import SCENE, MadeUpRun
 
 from crunchbot.errors import UserError
 from crunchbot.recording.writing import TopicWriter
-from crunchbot.robot.bag import Bag, metadata
+from crunchbot.robot.bags.played import RECORD, read_bag
+from crunchbot.robot.bags.writing import Bag, metadata
 from crunchbot.robot.network.inbox import Received
 from crunchbot.robot.network.streams import Envelope
-from crunchbot.robot.played import RECORD, read_bag
 from crunchbot.scene import write
 from crunchbot.view import command
 from crunchbot.view.__main__ import main as whisker_view

@@ -9,7 +9,7 @@ from pathlib import Path
 import chromium
 import pytest
 
-from crunchbot.robot.played import read_bag
+from crunchbot.robot.bags.played import read_bag
 from crunchbot.view.command import WANTED
 from crunchbot.view.hub import Hub
 from crunchbot.view.playback import Playback

@@ -15,7 +15,7 @@ import numpy as np
 from ...observation import VALUE, Quantity
 from ...pilot.pilot import compose
 from ...scene import Scene
-from ..log_clock import LogClock
+from ..bags.log_clock import LogClock
 from ..network.messages import HEALTH, End
 from ..network.ros import (
     BASE_FRAME,

@@ -1,4 +1,4 @@
-"""Scenes from a robot's bag (crunchbot.robot.bag): the rows that came, and the truth where a simulation reported it."""
+"""A scene and its rows from a robot's bag (bag.py), with the truth where a simulation reported it."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from crunchbot.nav.observations import Observations, joined, observed
-from crunchbot.observation import Quantity, parse
-from crunchbot.recording.mcapfile import RecordingError
-from crunchbot.recording.rosbag import open_bag
-from crunchbot.robot.network.inbox import Received
-from crunchbot.robot.network.messages import Observation, PoseStamped
-from crunchbot.robot.network.rows import Follower
-from crunchbot.robot.network.streams import Envelope
-from crunchbot.robot.played import BagError
-from crunchbot.robot.played import read_bag as played_bag
-from crunchbot.robot.topic_rows import read_by_table
-from crunchbot.scene import ARENA, Scene, load
+from ...nav.observations import Observations, joined, observed
+from ...observation import Quantity, parse
+from ...recording.mcapfile import RecordingError
+from ...recording.rosbag import open_bag
+from ...scene import ARENA, Scene, load
+from ..network.inbox import Received
+from ..network.messages import Observation, PoseStamped
+from ..network.rows import Follower
+from ..network.streams import Envelope
+from .played import BagError
+from .played import read_bag as played_bag
+from .topic_rows import read_by_table
 
 
 def is_bag(path: Path) -> bool:

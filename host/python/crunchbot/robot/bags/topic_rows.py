@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from ..files import UnreadableError, read_toml
-from ..observation import EXPLORING, Quantity, Row
-from ..pilot.pilot import compose
-from ..recording.rosbag import RosBag
-from ..scene import Scene
-from ..scene_table import Table
-from .network.ros import heading_of
-from .network.rows import LEAP_NS, ROW_NS, between, to_message
+from ...files import UnreadableError, read_toml
+from ...observation import EXPLORING, Quantity, Row
+from ...pilot.pilot import compose
+from ...recording.rosbag import RosBag
+from ...scene import Scene
+from ...scene_table import Table
+from ..network.ros import heading_of
+from ..network.rows import LEAP_NS, ROW_NS, between, to_message
 from .played import BagError, Played, Said
 
 MOTION = "motion"  # the column of an odometry

@@ -10,16 +10,16 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from ..recording.writing import TopicWriter
-from ..scene import Scene, load, write
+from ...recording.writing import TopicWriter
+from ...scene import Scene, load, write
+from ..network.health import ENDED, RUNNING, Health
+from ..network.inbox import Inbox, Received
+from ..network.link import Link
+from ..network.messages import HEALTH, SCHEMAS, encode
+from ..standard import types
+from ..standard.view import KINDS, StandardView
 from .log_clock import LogClock
-from .network.health import ENDED, RUNNING, Health
-from .network.inbox import Inbox, Received
-from .network.link import Link
-from .network.messages import HEALTH, SCHEMAS, encode
 from .played import FORMAT, SCENE_FILES
-from .standard import types
-from .standard.view import KINDS, StandardView
 
 LOOK_S = 0.5
 PLACING, PLACED_BY = ("/tf", "/map"), ("odometry", "pose", "map")  # of the standard topics, and what they follow from

@@ -1,6 +1,6 @@
 """The wall's time of what processes stamp with the bridge's clock."""
 
-from .network.rows import ROW_NS, leaps
+from ..network.rows import ROW_NS, leaps
 
 APART_NS = 60 * 10**9  # a message further from the newest row does not have this bridge's clock
 

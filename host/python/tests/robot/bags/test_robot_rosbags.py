@@ -15,10 +15,10 @@ from crunchbot.nav.observations import observations_path
 from crunchbot.observation import Row
 from crunchbot.recording.messages import definition
 from crunchbot.recording.types import make_store
+from crunchbot.robot.bags.played import BagError, read_bag
+from crunchbot.robot.bags.topic_rows import read_by_table
 from crunchbot.robot.network import messages as m
 from crunchbot.robot.network.rows import ROW_NS, to_message
-from crunchbot.robot.played import BagError, read_bag
-from crunchbot.robot.topic_rows import read_by_table
 from crunchbot.scene import Arena, Prior, Robot, Scene, Whisker, load, write
 from crunchbot.sensor_tables import SensorTable
 from crunchbot.view import command

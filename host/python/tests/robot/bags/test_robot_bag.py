@@ -21,14 +21,14 @@ from crunchbot.observation import Row
 from crunchbot.pilot.pilot import compose
 from crunchbot.recording.mcapfile import McapFile
 from crunchbot.recording.writing import TopicWriter
-from crunchbot.robot.bag import Bag, metadata
-from crunchbot.robot.log_clock import LogClock
+from crunchbot.robot.bags.log_clock import LogClock
+from crunchbot.robot.bags.played import RECORD
+from crunchbot.robot.bags.writing import Bag, metadata
 from crunchbot.robot.network import messages as m
 from crunchbot.robot.network.inbox import Received
 from crunchbot.robot.network.link import Link
 from crunchbot.robot.network.rows import RowPublisher
 from crunchbot.robot.network.streams import Envelope
-from crunchbot.robot.played import RECORD
 from crunchbot.scene import load
 from crunchbot.sensor_tables import SensorTable
 from crunchbot_lab import scenes

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import UserError
-from ..progress import bar
-from ..recording.mcapfile import McapFile, Message
-from ..recording.rosbag import RosBag, open_bag
-from ..scene import ARENA, PRIOR, ROBOT, Scene, load
-from .network.messages import MessageError, decode, type_of
+from ...errors import UserError
+from ...progress import bar
+from ...recording.mcapfile import McapFile, Message
+from ...recording.rosbag import RosBag, open_bag
+from ...scene import ARENA, PRIOR, ROBOT, Scene, load
+from ..network.messages import MessageError, decode, type_of
 
 RECORD, FORMAT = "whisker_robot", "1"  # name of a bag's metadata record, and of what it promises
 SCENE_FILES = (ARENA, ROBOT, PRIOR)
