@@ -28,9 +28,7 @@ CENTRES = 8
 LEAST_PLACES, LEAST_CONTACTS = 4, 8
 LINE_LEAST = 8  # samples in a line
 ONSET_SHARE = 0.06  # of the shortest push in calibration: lines before and after the onset
-ONSET_CLEAR = (
-    0.4  # of the largest change of slope: the first so large is the onset, later ones may be slips (radial.md)
-)
+ONSET_CLEAR = 0.4  # of the largest change of slope; later, larger ones may be slips (docs/radial.md)
 MEDIAN = 5  # samples: a running median takes out single bad records
 DEEPEST_SHARE = 0.98  # of the shortest push in calibration: the last depth
 RADIUS_SLACK = 0.15  # radii beyond the calibrated ones that are answered, as a share
