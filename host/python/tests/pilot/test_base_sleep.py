@@ -6,7 +6,7 @@ import signal
 import subprocess
 
 import pytest
-from createpeer import STOP, Driver, drive_order
+from createpeer import SAFE_MODE, STOP, Driver, drive_order
 
 from crunchbot.errors import UserError
 from crunchbot.pilot.base import IDLE
@@ -95,10 +95,17 @@ def machine(tmp_path):
 def driver(tmp_path, machine):
     machine.start_logind()
     driver = Driver(tmp_path, DBUS_SYSTEM_BUS_ADDRESS=machine.address)
-    driver.peer.await_start()
+    hear(driver)
     machine.logind.await_line(LOCK)
     yield driver
     driver.close()
+
+
+def hear(driver: Driver) -> None:
+    """Until the driver has heard a base in safe mode, which goes on telling."""
+    driver.peer.await_start()
+    driver.enter()
+    driver.peer.keep_telling(p35=SAFE_MODE)
 
 
 def keep_driving(client, until) -> None:
@@ -130,6 +137,7 @@ def test_the_wheels_stop_before_the_machine_sleeps_and_may_turn_when_it_is_awake
 def test_a_machine_that_is_frozen_after_the_notice_stands(driver, machine):
     with driver.client() as client:
         client.drive(0.2, 0)
+        driver.peer.await_order(drive_order(200, 200))
         pid = int(client.health()["driver_pid"])
         machine.logind.say("PrepareForSleep 1")
         keep_driving(client, "sleep")
@@ -154,7 +162,7 @@ def test_a_bus_that_answers_nothing_is_no_hindrance(tmp_path, machine):
     os.kill(machine.bus.process.pid, signal.SIGSTOP)
     driver = Driver(tmp_path, DBUS_SYSTEM_BUS_ADDRESS=machine.address)
     try:
-        driver.peer.await_start()
+        hear(driver)
         with driver.client() as client:
             assert client.drive(0.2, 0).v_m_s == 0.2
         assert driver.end() == 0
@@ -166,7 +174,7 @@ def test_a_bus_that_answers_nothing_is_no_hindrance(tmp_path, machine):
 
 def test_without_a_logind_there_is_no_lock_and_one_line(tmp_path, machine):
     driver = Driver(tmp_path, "--verbose", DBUS_SYSTEM_BUS_ADDRESS=machine.address)
-    driver.peer.await_start()
+    hear(driver)
     with driver.client() as client:
         while "no notice from logind" not in driver.log.read_text():
             assert client.drive(0.2, 0).v_m_s == 0.2
