@@ -107,7 +107,7 @@ static void frames_of_an_earlier_request_are_no_answer(void **state)
 {
     (void)state;
     const struct create_stream before = robot.stream;
-    say(commander, "mode safe", OPENED_MS + 200);
+    say(commander, "mode full", OPENED_MS + 200);
     const struct create_stream asked = robot.stream;
     assert_memory_not_equal(before.expected, asked.expected, asked.length);
     for (int i = 0; i < 100; i++) { /* to the letter, in the order of before */
@@ -152,6 +152,21 @@ static void what_has_waited_to_be_read_is_old(void **state)
 
 /* ------------------------------------------------------------------------------------------------------------ the mode
  */
+
+/* A pilot says its mode in each block of 20 ms, until it sees it. */
+static void a_mode_that_is_said_again_and_again_is_entered(void **state)
+{
+    (void)state;
+    int64_t now_ms = OPENED_MS;
+    const unsigned requests = robot.requests;
+    for (int i = 0; i < 30; i++) {
+        say(commander, "mode full", now_ms += FRAME_MS);
+        base_robot_watch(&robot, now_ms);
+        report(i < 20 ? CREATE_OI_MODE_PASSIVE : CREATE_OI_MODE_FULL, 0, 0, now_ms);
+    }
+    assert_int_equal(robot.requests, requests + 1);
+    assert_int_equal(robot.phase, BASE_ENTERED);
+}
 
 static void a_mode_is_asked_for_until_the_base_says_it(void **state)
 {
@@ -357,6 +372,7 @@ int main(void)
         HEARD(frames_of_an_earlier_request_are_no_answer),
         HEARD(a_base_that_is_not_heard_for_half_a_second_stands),
         HEARD(what_has_waited_to_be_read_is_old),
+        HEARD(a_mode_that_is_said_again_and_again_is_entered),
         UNHEARD(a_mode_is_asked_for_until_the_base_says_it),
         HEARD(a_base_that_did_not_hear_of_a_lower_mode_does_not_drive),
         HEARD(a_mode_ends_with_who_asked_for_it),

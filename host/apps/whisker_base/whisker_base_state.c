@@ -167,8 +167,13 @@ static void whisker_base_state_begin_phase(struct base_robot *robot, enum base_p
     }
 }
 
+/* A mode that is in force, or on its way, is not begun anew: a commander may repeat itself faster than a base answers.
+ */
 void base_robot_ask_mode(struct base_robot *robot, enum create_oi_mode mode, int64_t now_ms)
 {
+    if (robot->wanted == mode && !robot->left) {
+        return;
+    }
     robot->wanted = mode;
     robot->left = false;
     whisker_base_state_begin_phase(robot, BASE_RESTING, now_ms);
