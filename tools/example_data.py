@@ -100,7 +100,7 @@ def add_rates(path: Path, rates: np.ndarray) -> None:
 
 def make_models(folder: Path) -> None:
     """What the commands learn from those."""
-    fit = ["radial", "fit", "contacts.csv", "--out", "radial.json"]
+    fit = ["radial", "fit", "contacts.csv", "--model", "whisk", "--out", "radial.json"]  # `radial follow` asks for one
     for words in (["texture", "train", "surfaces", "--out", "texture.json"], fit):
         subprocess.run([*WHISKER, *words], cwd=folder, check=True)
 

@@ -24,6 +24,8 @@ FILES = {  # what the pages' commands read, by what stands for it
     "calibration/object_2.csv": "examples/contacts.csv",
     "model.json": "examples/radial.json",
     "models/texture.json": "examples/texture.json",
+    "texture.json": "examples/texture.json",
+    "new.csv": "examples/surfaces/ROUGH/1.csv",
     "textures/ROUGH/left_ROUGH1.csv": "examples/surfaces/ROUGH/1.csv",
     "room.yaml": "examples/home.yaml",
     "home.pgm": "examples/home.pgm",
@@ -39,7 +41,7 @@ LOG, LOG_ROWS = "recordings/random_1", 30  # a Thymio's
 # What a command prints, or FOREVER: it runs until Ctrl-C. In this order: some write what others read.
 ON_FILES = {
     "whisker scene make --list-families": "anchor",
-    "whisker scene make --family robot --seed 1 --out scenes/mine": "scenes/mine: robot, seed 1",
+    "whisker scene make --family robot --seed 1 --out scenes/mine": ": robot, seed 1",
     "whisker scene make --family free+kidnap+outliers --seed 7 --out scenes/7": "scenes/7: free+kidnap+outliers, seed 7",
     "whisker localise scenes/run1 --filter grid --out est.csv": "",
     "whisker localise SCENE --map room.yaml --json": '"pose_error_median_m"',
@@ -49,9 +51,11 @@ ON_FILES = {
     "whisker radial fit calibration/lane2.csv --out lane2.json": "chosen",
     "whisker radial fit calibration/object_2.csv --out models/object_2.json": "chosen",
     "whisker radial predict lane2.json contacts.csv --json": '"radius_mm": ',
-    "whisker radial follow lane2.json contacts.csv": "body whisk",
+    "whisker radial fit calibration/lane2.csv --model whisk --out whisk2.json": "whisk",
+    "whisker radial follow whisk2.json contacts.csv": "body whisk",
     "whisker radial follow model.json contacts.csv --json": '"motion": "body whisk"',
     "whisker texture classify models/texture.json textures/ROUGH/left_ROUGH1.csv": "ROUGH",
+    "whisker texture classify texture.json new.csv": "ROUGH",
     "whisker flash firmware/images/node.whex": "no bridge is connected",
     "whisker flash firmware/images/node.whex --dry-run": "no bridge is connected",
     "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --desktop --units units": "whisker-robot.target; next: ",
@@ -87,6 +91,7 @@ WITHOUT_HARDWARE = {
     "whisker-view --robot --connect tcp/robot.local:7458": "http://127.0.0.1:",
     "whisker-view --robot --connect tls/robot.local:7458 --zenoh-config FILE": "http://127.0.0.1:",
     "whisker-view --robot --scene SCENE": "http://127.0.0.1:",
+    "whiskerd --ring whisker --lane-mask 1": "no bridge is connected; plug it in",
     "whiskerd --ring whisker": "no bridge is connected; plug it in",
     "whiskerd --ring whisker --wait": "no bridge is connected; plug it in",
     "whiskerd --ring whisker --wait --verbose": "no bridge is connected; plug it in",
@@ -106,6 +111,7 @@ REASONS = {
         "whisker scene from run.mcap --out scenes/run",
         "whisker scene from run1/robot.mcap --out scenes/run1",
         "whisker texture train textures --out models/texture.json",
+        "whisker texture train recordings --out texture.json",
         "whisker top",
         "whisker top --ring replayed",
     ),
@@ -125,7 +131,13 @@ REASONS = {
         "90,100,110,120,130,138 --repeats 5 --whisk-rad-s 0.1309",
     ),
 }
-LENGTHS = (("--seconds 60", "--seconds 2"), ("--frames 16000", "--frames 400"))
+# Lengths of time, and what the other commands read already.
+LENGTHS = (
+    ("--out scenes/mine", "--out scenes/made"),
+    ("--out models/object_2.json", "--out models/made.json"),
+    ("--seconds 60", "--seconds 2"),
+    ("--frames 16000", "--frames 400"),
+)
 
 
 def in_pages() -> set[str]:
