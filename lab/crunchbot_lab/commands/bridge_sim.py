@@ -118,7 +118,7 @@ def _command(arguments, folder: Path) -> list[str]:
 
 def _pico_command(arguments) -> list[str]:
     if not (PICO_SIM / "node_modules/rp2040js").is_dir():
-        raise UserError("bridge-sim: the emulator of the Pico is not there; run: npm ci --prefix sim/pico")
+        raise UserError("bridge-sim: the emulator of the Pico is not there; run: make setup-tests")
     lanes = arguments.lanes or PICO_LANES
     if lanes > PICO_LANES_MAX:
         raise UserError(f"bridge-sim: --lanes {lanes}: a Pico has {PICO_LANES_MAX}; give fewer")
