@@ -133,8 +133,8 @@ REASONS = {
 }
 # Lengths of time, and what the other commands read already.
 LENGTHS = (
-    ("--out scenes/mine", "--out scenes/made"),
-    ("--out models/object_2.json", "--out models/made.json"),
+    ("--out scenes/mine", "--out scenes/mine --overwrite"),
+    ("--out models/object_2.json", "--out models/object_2.json --overwrite"),
     ("--seconds 60", "--seconds 2"),
     ("--frames 16000", "--frames 400"),
 )

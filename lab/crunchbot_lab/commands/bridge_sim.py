@@ -59,9 +59,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     port = whole_number(0, PORT_MAX)
     parser.add_argument("--usbip", nargs="?", type=port, const=USBIP_PORT, metavar="PORT", help=text)
-    text = (
-        "bridge: gateware, nodes and MLX90333; pico: the firmware of the Pico, executed, with TMAG5170s (%(default)s)"
-    )
+    text = "bridge: gateware, nodes and MLX90333; pico: the firmware of the Pico, executed, with TMAG5170s"
     parser.add_argument("--board", choices=BOARDS, default=BOARDS[0], help=text)
     parser.set_defaults(run=run)
 

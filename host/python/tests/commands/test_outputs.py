@@ -31,7 +31,7 @@ TRIED_ELSEWHERE = {  # by what they share with those of writers.cases
 # checkpoint, run folder). An argument that is new is written down here, or is made by `add_output`.
 INPUTS = {
     "doctor --rest", "scene from --topics", "scene from --scene", "view --topics", "bridge-sim --fault", "bridge-sim --scene", "bag --scene", "bag --zenoh-config", "calibrate --nodes", "calibrate --scene",
-    "export file", "flash image", "foxglove scene", "foxglove --zenoh-config", "localise scene", "localise --map", "map scene",
+    "export file", "flash image", "flash --uf2", "foxglove scene",  "foxglove --zenoh-config", "localise scene", "localise --map", "map scene",
     "mapper scene", "mapper --journal", "mapper --zenoh-config", "navigator scene", "navigator --checkpoint",
     "navigator --zenoh-config", "pilot scene", "pilot --models", "pilot --nodes", "pilot --base", "pilot --simulation",
     "pilot --zenoh-config", "pyro --zenoh-config", "radial fit contacts", "radial predict contacts", "radial predict model",
@@ -45,6 +45,7 @@ WORDS = {
     "PROCESS",
     "ENDPOINT",
     "ADDRESS",
+    "ORIGIN",
     "tcp/HOST:PORT",
     "F",
     "LIST",
