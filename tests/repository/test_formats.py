@@ -29,6 +29,7 @@ from crunchbot.touch.radial.curve import CurveModel
 from crunchbot.touch.radial.whisk import WhiskModel
 from crunchbot.touch.texture import model as texture_model
 from crunchbot.touch.texture import spectral
+from crunchbot.touch.texture.change import Change
 from crunchbot.touch.texture.classifier import Classifier
 from crunchbot.touch.texture.novelty import Novelty
 from crunchbot_lab import scenes
@@ -212,7 +213,7 @@ def test_fields_of_texture_models():
     for row in tables("Texture models")[1][1:]:
         part = (names(row[:1]) or {part}).pop()
         parts.setdefault(part, set()).update(names([row[1]]))
-    for name, kind in (("classifiers", Classifier), ("novelty", Novelty)):
+    for name, kind in (("classifiers", Classifier), ("change", Change), ("novelty", Novelty)):
         assert parts[name] == {*kind.NUMBERS, *kind.ARRAYS, *({"span"} if kind is Classifier else ())}
     naive = re.search(r"The naive Bayes.*?\n\n", PAGE, re.DOTALL)[0]
     saved = set(re.findall(r'"(\w+)"', inspect.getsource(texture_model.TextureModel.save)))

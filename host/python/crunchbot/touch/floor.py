@@ -61,20 +61,29 @@ class FloorWhisker:
 
 
 class SpectralFloorWhisker:
-    """One floor whisker, the spectral way: it needs no rest, knows its windows in a row and says what it doubts."""
+    """One floor whisker, the spectral way: it needs no rest, knows its windows in a row and says what it doubts.
+
+    Counts what it saw: windows, borders between surfaces or catches at them, and windows it had no answer to.
+    """
 
     def __init__(self, model: SpectralModel):
         self.model = model
+        self.windows = self.borders = self.unknown = 0
         self._stream = model.stream(WINDOW_SAMPLES)
 
     def follow(self, samples: np.ndarray) -> None:
         """Spectra are of differences: a drifting rest is not in them."""
 
     def look(self, window: np.ndarray) -> np.ndarray | None:
-        """Log-likelihood by class of a window (200, 2), nan where a sample is bad; None: no evidence, as during a catch or of
-        a surface never trained."""
-        (found,) = self._stream.push(window)
-        return found.loglik if found.confidence > 0.0 and found.novelty <= 1.0 else None
+        """Log-likelihood by class of a window (200, 2), nan where a sample is bad; None: no evidence, as during a catch.
+
+        Across a border it is that of the later half; of a surface never trained it is weak for all.
+        """
+        *notices, found = self._stream.push(window)
+        self.windows += 1
+        self.borders += bool(found.border or notices)
+        self.unknown += found.label < 0
+        return found.loglik if found.confidence > 0.0 else None
 
     def pause(self) -> None:
         """The next window does not follow the last."""
