@@ -34,7 +34,11 @@ FILES = {  # what the pages' commands read, by what stands for it
     "SCENE": "examples/scene",
     "scenes/mine": "examples/scene",
     "MODELS/texture.json": "examples/texture.json",
-    **{f"{name}{n}.json": "examples/radial.json" for name in ("MODELS/object", "models/object_") for n in (1, 2, 3, 4)},
+    **{
+        f"{name}{n}.json": "examples/radial.json"
+        for name in ("MODELS/object", "models/object_", "models/object")
+        for n in (1, 2, 3, 4)
+    },
     "firmware/images/node.whex": "examples/node.whex",
 }
 LOG, LOG_ROWS = "recordings/random_1", 30  # a Thymio's
