@@ -12,9 +12,8 @@ HEADLINES = tomllib.loads((ROOT / "bench/headlines.toml").read_text())["figure"]
 def fields(result: str) -> dict:
     """Of a result, for patterns; sums and choices that a pattern cannot make."""
     data = read_result(result)
-    if result == "nav_unseen":
-        of = data["families"].values()
-        return {"starts": len(of)} | {key: sum(f[key] for f in of) for key in ("locked", "runs")}
+    if result == "nav_families":
+        return data["families"]["all"] | {"families": len(data["draws"])}
     if result == "ring":
         polling = {"mode": "poll", "pace": "2khz", "readers": 1}
         return {row["peer"]: row["latency_us"]["p50"] for row in data["rows"] if polling.items() <= row.items()}

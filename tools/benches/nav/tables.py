@@ -1,9 +1,10 @@
-"""Tables of docs/results/nav.md and nav_unseen.md."""
+"""Tables of docs/results/nav.md and nav_families.md."""
 
 from crunchbot.nav import localise
 
 from ..store import read_result
 from ..tables import lined, named, table
+from .judge import FIGURES
 
 OURS = localise.default_filter()
 PEER = ("filterpy", "particles", "pfilter", "mrpt")  # the first words of other projects' filters
@@ -83,19 +84,9 @@ def stability() -> str:
     return table([*head, "invalid results", "confidence: area under curve", "calibration error"], rows)
 
 
-UNSEEN = {
-    "locked": "{locked} of {runs}",
-    "rows to lock": "{rows_to_lock:.0f}",
-    "error, mm": "{error_mm:.1f}",
-    "truths within the 90 % region": "{coverage_90:.2f}",
-    "its area, cm2": "{region_90_cm2:.1f}",
-    "sure and wrong, %": "{sure_wrong:100*.1f}",
-    "us a row": "{us:.0f}",
-}
-
-
-def unseen() -> str:
-    return lined(named(read_result("nav_unseen")["families"], "family"), {"family, start": "{family}"} | UNSEEN)
+def families() -> str:
+    """The default filter on every family, and on all of each group."""
+    return lined(named(read_result("nav_families")["families"], "family"), {"family": "{family}"} | FIGURES)
 
 
 WANTED_MM = {"anchor": 20, "robot": 35, "raw": 45, "noisy": 80}
