@@ -33,7 +33,7 @@ def add_door(parser: argparse.ArgumentParser, port: int) -> None:
     add_address(parser, port)
     text = "also answer under this name, as behind a forwarded port; repeatable"
     parser.add_argument("--allow-host", action="append", default=[], metavar="NAME", help=text)
-    text = "who reaches it may set where the robot is; on loopback they always may"
+    text = "who reaches it may set where the robot is, stop it and record; on loopback they always may"
     parser.add_argument("--allow-pose", action="store_true", help=text)
 
 

@@ -14,6 +14,7 @@ from ..pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS, TICK_S
 from ..pilot.pilot import Pilot
 from ..pilot.wheels import Bumps
 from .blocks import Block, LiveRing, blocks
+from .network import order
 from .network.health import ENDED, RUNNING, Health
 from .network.link import Link
 from .policy import expected
@@ -27,6 +28,7 @@ LOOK_S = 0.05  # between looks at what else there is to do while no samples come
 LATE_BLOCKS = 10  # so far behind, a live pilot leaves out what it has not looked at
 NAVIGATOR = "navigator"
 LOST = Bumps(lost=True)
+ORDERED = "stopped by a person: the wheels stand until the page says that it may go on"
 NO_HEARTBEAT = "no heartbeat of the supervisor: wheels stopped; see whether `whisker robot` hangs"
 
 
@@ -110,6 +112,7 @@ class LiveFlight:
         self._restarts = ring.restarts
         self.blocks_left_out = self.halts = self.navigator_lost = 0
         self._navigator, self._last_error = False, ""
+        self._orders, self._is_ordered = link.subscribe(order.TOPIC), False
 
     def run(self, stop: Callable[[], bool]) -> None:
         """Block by block; ends with the wheels stopped."""
@@ -124,7 +127,7 @@ class LiveFlight:
     def _step(self) -> None:
         come = self._ring.take(LOOK_S)
         self._stop_for_another_writer()
-        self._obey_heartbeat()
+        self._obey_orders()
         made = come[-LATE_BLOCKS:]
         self.blocks_left_out += len(come) - len(made)
         if len(come) > len(made) or (made and self._begin_anew):
@@ -138,7 +141,7 @@ class LiveFlight:
             self._halt()
         self._look_for_navigator()
         state = self.state
-        self._last_error = self._last_error if state == RUNNING else state
+        self._last_error = self._last_error if state in (RUNNING, ORDERED) else state
         self._health.report(self._stamp_ns, state, self._last_error)
 
     def _stop_for_another_writer(self) -> None:
@@ -148,9 +151,10 @@ class LiveFlight:
             self._halt()
         self._restarts = self._ring.restarts
 
-    def _obey_heartbeat(self) -> None:
-        """While it is silent the wheels stand and blocks are still read."""
-        held = not self._heartbeat.beats
+    def _obey_orders(self) -> None:
+        """While the heartbeat is silent, or a person wants it, the wheels stand and blocks are still read."""
+        self._is_ordered = order.is_hold(self._orders.take(timeout_s=0.0), self._is_ordered)
+        held = self._is_ordered or not self._heartbeat.beats
         if held and not self._wheels.held:
             self._halt()
         self._begin_anew |= self._wheels.held and not held
@@ -174,7 +178,9 @@ class LiveFlight:
         """What keeps the pilot from its work, the gravest first; else RUNNING."""
         if self._halted:
             return self._ring.trouble or f"ring {self._ring.name}: no samples; see whisker top"
-        return NO_HEARTBEAT if self._wheels.held else self._wheels.base.trouble or RUNNING
+        if self._wheels.held:
+            return NO_HEARTBEAT if not self._heartbeat.beats else ORDERED
+        return self._wheels.base.trouble or RUNNING
 
     def counters(self) -> dict[str, object]:
         """What has been counted since the start, and the base's own health."""

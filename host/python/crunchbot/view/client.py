@@ -34,11 +34,13 @@ def hello(hub: Hub) -> dict:
         "rings": hub.rings(),
         "robot": hub.source.name,
         "may_set_pose": hub.may_set_pose,
+        "may_record": hub.recorder is not None,
         "playback": bool(hub.source.playback()),
         "window": WINDOW,
         "widths": WIDTHS,
         "bins": BINS,
         "lanes": LANES,
+        "lane_names": [whisker.name for whisker in hub.robot.scene.robot.whiskers] if hub.robot.scene else [],
         "degrees_per_count": DEGREES_PER_COUNT,
         "rest_count": REST_COUNT,
         "wire_version": WIRE_VERSION,
@@ -143,11 +145,17 @@ class Client:
             case "set_pose":
                 self._become_page()
                 self._hub.set_pose(request)
+            case "hold":
+                self._become_page()
+                self._hub.hold(request)
+            case "record":
+                self._become_page()
+                self._hub.record(request)
             case "play":
                 self._become_page()
                 self._hub.play(request)
             case _:
-                raise RequestError("type: not ack, subscribe, unsubscribe, set_pose or play")
+                raise RequestError("type: not ack, subscribe, unsubscribe, set_pose, hold, record or play")
 
     def _become_page(self) -> None:
         if not self._is_page and not self._enter():

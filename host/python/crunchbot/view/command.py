@@ -6,6 +6,7 @@ import contextlib
 import ipaddress
 import logging
 import webbrowser
+from functools import partial
 from pathlib import Path
 
 from ..arguments import add_ring_owner, add_topics, add_zenoh_config
@@ -13,10 +14,12 @@ from ..errors import UserError
 from ..guard import add_door, may_set_pose, warn_if_open
 from ..robot.bags.played import read_bag
 from ..robot.bags.topic_rows import read_by_table
+from ..robot.processes.parts import whisker
 from ..scene import load
 from ..stopping import listen
 from .hub import Hub
 from .playback import Playback
+from .recorder import Recorder
 from .rings import is_name
 from .robot_source import WANTED, NoRobot, join
 from .server import ViewError, serving
@@ -58,6 +61,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="a process of the robot; repeatable (default: pilot and navigator of this machine)",
     )
     add_zenoh_config(parser)
+    text = "where the page's button records to, each time a new file"
+    parser.add_argument("--records", type=Path, default=Path(), metavar="DIR", help=text)
     add_door(parser, PORT)
     parser.add_argument("--open", action="store_true", help="open the page in a browser")
     parser.set_defaults(run=run)
@@ -77,12 +82,27 @@ def run(arguments: argparse.Namespace, part: str = "") -> int:
         table = arguments.topics
         played = read_by_table(arguments.file, table, scene) if table else read_bag(arguments.file, wanted)
         source, scene = Playback(played), scene or played.scene
+    may = may_set_pose(arguments)
+    recorder = Recorder(arguments.records, partial(_recording, arguments)) if may and not arguments.file else None
     try:
-        return asyncio.run(
-            _serve(arguments, Hub(rings, source, scene, arguments.ring_owner, may_set_pose(arguments)), part)
-        )
+        return asyncio.run(_serve(arguments, Hub(rings, source, scene, arguments.ring_owner, may, recorder), part))
     finally:
+        if recorder:
+            recorder.close()
         source.close()
+
+
+def _recording(arguments: argparse.Namespace, ring: str | None, file: Path) -> list[str]:
+    """The command that records what a page looks at."""
+    scene = ["--scene", arguments.scene] if arguments.scene else []
+    if ring is not None:
+        owner = [] if arguments.ring_owner is None else ["--ring-owner", str(arguments.ring_owner)]
+        return [*whisker("record"), str(file), "--ring", ring, *owner, *scene]
+    if not _is_asked(arguments):
+        raise UserError("no robot is looked at; look at its whiskers, or start whisker-view with --robot")
+    ends = [word for end in arguments.connect for word in ("--connect", end)]
+    config = ["--zenoh-config", str(arguments.zenoh_config)] if arguments.zenoh_config else []
+    return [*whisker("bag"), str(file), "--stay", "--robot", arguments.robot or ROBOT, *ends, *config, *scene]
 
 
 def _source(arguments: argparse.Namespace) -> NoRobot:
@@ -95,8 +115,11 @@ def _source(arguments: argparse.Namespace) -> NoRobot:
         return NoRobot()
     if arguments.topics:
         raise PlaybackError("--topics: no bag to read by it; name one")
-    asked = arguments.robot or arguments.scene or arguments.connect or config
-    return join(arguments.robot or ROBOT, arguments.connect, config) if asked else NoRobot()
+    return join(arguments.robot or ROBOT, arguments.connect, config) if _is_asked(arguments) else NoRobot()
+
+
+def _is_asked(arguments: argparse.Namespace) -> bool:
+    return bool(arguments.robot or arguments.scene or arguments.connect or arguments.zenoh_config)
 
 
 async def _serve(arguments: argparse.Namespace, hub: Hub, part: str) -> int:

@@ -3,9 +3,11 @@
 import asyncio
 import time
 
+from ..errors import UserError
 from ..fields import Fields
 from ..robot.network import initial_pose
 from ..scene import FARTHEST_M, Scene
+from .recorder import Recorder
 from .rings import find_rings
 from .robot import RobotModel
 from .robot_source import SPEED_LEAST, SPEED_MOST, NoRobot
@@ -15,6 +17,7 @@ ROUND_S = 1 / 30
 IDLE_S = 0.25  # between rounds while nobody looks: the counts go on, the ring holds seconds
 SEARCH_S = 1.0  # between looks for rings
 TAPS_MAX = 16
+HOLD_S = 1.0  # between two words of a stop that lasts: a pilot that is started again must hear of it
 
 
 class RequestError(ValueError):
@@ -31,14 +34,18 @@ class Hub:
         scene: Scene | None = None,
         ring_owner: int | None = None,
         may_set_pose: bool = False,
+        recorder: Recorder | None = None,
     ):
         """`source`: where the robot's messages come from; `scene`: where it is and what it looks like, if known;
-        `ring_owner`: the user whose rings are read, too; `may_set_pose`: pages may set where the robot is.
+        `ring_owner`: the user whose rings are read, too; `may_set_pose`: pages may set where the robot is, and
+        stop it; `recorder`: for pages that may record; None: none may.
         """
         self.names, self._ring_owner = names, ring_owner
         self.source = source or NoRobot()
         self.robot = RobotModel(scene, self.source.clock)
         self.may_set_pose = may_set_pose and bool(self.source.name) and not self.source.playback()
+        self.recorder = recorder
+        self.held, self._hold_due = False, float("inf")
         self.robot_watchers = 0
         self._taps = {name: Tap(name, owner=ring_owner) for name in names}
         self._watchers = dict.fromkeys(names, 0)
@@ -87,6 +94,36 @@ class Hub:
             raise RequestError(f"set_pose: {error}") from None
         self.source.set_pose(pose)
 
+    def hold(self, request: dict) -> None:
+        """Let the robot stand, or go on. RequestError: it may not."""
+        if not self.may_set_pose:
+            raise RequestError("hold: not allowed here; start whisker-view with --robot and --allow-pose")
+        self.held = _is_on(request, "hold")
+        self._tell_hold(time.monotonic())
+
+    def _tell_hold(self, now: float) -> None:
+        self.source.hold(self.held)
+        self._hold_due = now + HOLD_S if self.held else float("inf")
+
+    def record(self, request: dict) -> None:
+        """Begin or end a recording: of the `ring` that is named, else of the robot. RequestError: it cannot be."""
+        if self.recorder is None:
+            raise RequestError("record: not allowed here; start whisker-view with --allow-pose, and without a bag")
+        if not _is_on(request, "record"):
+            return self.recorder.stop()
+        ring = request.get("ring")
+        if ring is not None and (not isinstance(ring, str) or ring not in self.rings()):
+            raise RequestError("record: ring: not one of this machine; take one that topic rings lists")
+        try:
+            self.recorder.start(ring)
+        except UserError as error:
+            raise RequestError(f"record: {error}") from None
+
+    def controls(self) -> dict:
+        """What the header's buttons show."""
+        recording = self.recorder.state() if self.recorder else None
+        return {"recording": recording, "held": self.held, "said": self.recorder.said if self.recorder else ""}
+
     def play(self, request: dict) -> None:
         """Play the recording as a page asks for. RequestError: it asks for something else, or there is none."""
         playback = self.source.playback()
@@ -115,7 +152,16 @@ class Hub:
                 self.robot.begin_anew()
             for topic, message in self.source.poll():
                 self.robot.take(topic, message)
+            if began >= self._hold_due:
+                self._tell_hold(began)
             self._round.set()
             self._round = asyncio.Event()
             period = ROUND_S if self.robot_watchers or any(self._watchers.values()) else IDLE_S
             await asyncio.sleep(max(0.0, period - (time.monotonic() - began)))
+
+
+def _is_on(request: dict, kind: str) -> bool:
+    try:
+        return Fields(request).flag("on")
+    except ValueError as error:
+        raise RequestError(f"{kind}: {error}") from None

@@ -26,6 +26,7 @@ CONTACTS_MOST = 60
 PROCESSES_MOST = 32
 COUNTERS_MOST = 24
 CELLS_MOST = 512
+FILTERS_MOST = 16
 TOUCHED = (Quantity.NORMAL, Quantity.POINT)  # shown as surfaces, not by whisker
 TEXT_MOST = 200  # characters of any received text
 COUNTER_TEXT_MOST = 80  # of a counter's name, and of its value
@@ -67,6 +68,11 @@ def placed(pose: Any) -> dict | None:
     """x, y, theta of a Pose; None: it is of no place that a map can have."""
     place = pose.xytheta
     return dict(zip(("x", "y", "theta"), map(real, place), strict=True)) if max(map(abs, place)) <= FARTHEST_M else None
+
+
+def _spread(covariance: np.ndarray) -> float | None:
+    """One standard deviation of the place, m."""
+    return real(math.sqrt(max(0.0, covariance[0, 0] + covariance[1, 1])))
 
 
 class Path:
@@ -126,6 +132,8 @@ class RobotModel:
         self.contacts: dict[tuple[str, int], dict] = {}
         self.surfaces = Surfaces()
         self.rows = {"missed": None, "unseen": 0}
+        self.filters: dict[str, dict] = {}  # the newest answer of each, the robot's first
+        self._read_s: float | None = None  # of the last row in which a whisker read anything, or of the first row
         self._seq: int | None = None
         self._filter = ""
 
@@ -161,7 +169,13 @@ class RobotModel:
         cells = list(zip(columns, row.cells.tolist(), row.values.tolist(), strict=True))[:CELLS_MOST]
         tips, rays = _sorted([cell for cell in cells if cell[0].quantity not in TOUCHED])
         self.surfaces.take(row.seq, [cell for cell in cells if cell[0].quantity in TOUCHED])
+        if self._read_s is None or VALUE in row.cells:
+            self._read_s = row.header.stamp.ns / 1e9
         self.row = {"seq": row.seq, "kind": KINDS[row.kind], "tips": tips, "rays": rays}
+
+    def unread_s(self) -> float | None:
+        """Seconds of the robot's clock without a reading; None: no row has come."""
+        return None if self._read_s is None else self.now_s - self._read_s
 
     def _column(self, name: str) -> Column:
         """The column of this name, by the scene's layout, or, without a scene, by the name alone."""
@@ -171,6 +185,7 @@ class RobotModel:
     def _take_localisation(self, reported) -> None:
         """Of several filters the first is the one whose pose is the robot's."""
         self._filter = self._filter or reported.filter
+        self._note_filter(reported)
         if reported.filter != self._filter:
             return
         self.rows["missed"] = reported.rows_missed
@@ -181,7 +196,7 @@ class RobotModel:
         self.path.add(reported.header.stamp.ns / 1e9, *self.pose.values(), reported.confidence)
         covariance = reported.pose.planar_covariance
         self.pose |= {
-            "sigma_m": real(math.sqrt(max(0.0, covariance[0, 0] + covariance[1, 1]))),
+            "sigma_m": _spread(covariance),
             "sigma_rad": real(math.sqrt(max(0.0, covariance[2, 2]))),
             "confidence": real(reported.confidence),
             "filter": text(reported.filter),
@@ -191,6 +206,12 @@ class RobotModel:
             "prior": text(reported.prior),
         }
         self.surfaces.place(reported.observation_seq, self.pose)
+
+    def _note_filter(self, reported) -> None:
+        name, place = text(reported.filter), placed(reported.pose.pose)
+        if place is not None and (name in self.filters or len(self.filters) < FILTERS_MOST):
+            sigma_m = _spread(reported.pose.planar_covariance)
+            self.filters[name] = {"name": name, "confidence": real(reported.confidence), "sigma_m": sigma_m} | place
 
     def _note_mapper(self, reported) -> None:
         """A mapper's frame is its own: the truth is shown in it, by the first row of which both are known."""

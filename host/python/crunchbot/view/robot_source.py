@@ -52,12 +52,16 @@ class NoRobot:
         """Tell the navigator that the robot is here: x, y in m, heading in rad."""
         raise UserError("no robot is looked at; start whisker-view with --robot")
 
+    def hold(self, on: bool) -> None:
+        """Tell the pilot that the robot is to stand, or may go on."""
+        raise UserError("no robot is looked at; start whisker-view with --robot")
+
     def close(self) -> None:
         return
 
 
 class InboxSource(NoRobot):
-    """Takes what an Inbox holds; `close` ends the link it belongs to, `set_pose` sends a pose over it."""
+    """Takes what an Inbox holds; `close` ends the link it belongs to, `set_pose` and `hold` send over it."""
 
     def __init__(
         self,
@@ -66,9 +70,10 @@ class InboxSource(NoRobot):
         text: str = "",
         close: Callable[[], None] = lambda: None,
         set_pose: Callable | None = None,
+        hold: Callable | None = None,
     ):
         self.name, self._inbox, self._text, self.close = name, inbox, text, close
-        self.set_pose = set_pose or super().set_pose
+        self.set_pose, self.hold = set_pose or super().set_pose, hold or super().hold
 
     def link(self) -> dict:
         return {"state": "open", "text": self._text}
@@ -82,15 +87,16 @@ class InboxSource(NoRobot):
 
 
 def join(robot: str, connect: list[str], config: Path | None = None) -> InboxSource:
-    """Listen to a robot's streams; nothing is published but poses that a page sets. `connect`: its processes' endpoints,
+    """Listen to a robot's streams; nothing is published but poses and orders of a page. `connect`: its processes' endpoints,
     tcp/HOST:PORT or tls/HOST:PORT, which need not be there yet; none: those of this machine. `config`: a file of zenoh's
     own configuration. UserError: it cannot be."""
     try:
-        from ..robot.network import initial_pose
+        from ..robot.network import initial_pose, order
         from ..robot.network.link import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, Link
     except ImportError as error:
         raise UserError(f"--robot needs {error.name}, which is not installed; make setup installs it") from error
     endpoints = connect or [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT]
     link = Link("view", robot, connect=endpoints, config=config)
     text = f"Listening at {', '.join(endpoints)}"
-    return InboxSource(robot, link.subscribe(*WANTED), text, link.close, lambda pose: initial_pose.send(link, pose))
+    tell = (lambda pose: initial_pose.send(link, pose), lambda on: order.send(link, on, "a person at the page"))
+    return InboxSource(robot, link.subscribe(*WANTED), text, link.close, *tell)

@@ -110,6 +110,23 @@ class Rings:
         return
 
 
+class Controls:
+    """What is recorded, and whether a page has the robot stand, as JSON, at first and when it changes."""
+
+    def __init__(self, hub: Hub, options: dict):
+        self._hub, self._reported = hub, None
+
+    def take(self) -> str | None:
+        message = {"topic": "controls"} | self._hub.controls()
+        if message == self._reported:
+            return None
+        self._reported = message
+        return json.dumps(message)
+
+    def close(self) -> None:
+        return
+
+
 @dataclass(frozen=True)
 class Topic:
     """`feed(hub, options)` subscribes, or raises RequestError. `id` is the first byte of its binary messages."""
@@ -127,4 +144,5 @@ TOPICS = {
     "robot": Topic(5, RobotFeed, RobotFeed.__doc__),
     "belief": Topic(BELIEF_ID, BeliefFeed, BeliefFeed.__doc__),
     "map": Topic(7, MapFeed, MapFeed.__doc__),
+    "controls": Topic(8, Controls, Controls.__doc__),
 }

@@ -38,7 +38,7 @@ INPUTS = {
     "radial follow contacts", "radial follow model", "record --scene", "replay file", "robot scene", "robot --models", "robot --out",
     "robot --port", "robot --zenoh-config", "ros2 scene", "ros2 --zenoh-config", "scene from kind", "scene from recording",
     "scene map map", "scene map scene", "texture train folder", "texture classify model", "texture classify recording",
-    "top --scene", "view file", "view --scene", "view --zenoh-config",
+    "top --scene", "view file", "view --records", "view --scene", "view --zenoh-config",
 }  # fmt: skip
 WORDS = {
     "KEY=VALUE",

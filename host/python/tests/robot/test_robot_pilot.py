@@ -16,6 +16,7 @@ from crunchbot.commands import pilot as pilot_command
 from crunchbot.pilot.base import BaseLost, Motion
 from crunchbot.pilot.behaviour import BLOCK_TICKS, ODOMETRY_TICKS
 from crunchbot.robot import wheels as wheels_module
+from crunchbot.robot.network import messages, order
 from crunchbot.robot.network.health import RUNNING
 from crunchbot.robot.pilot_process import LOST, NO_HEARTBEAT, SILENCE_S, Flight, LiveFlight, LiveWheels
 from crunchbot.robot.wheels import MODE, RETRY_S, LiveBase, Report, wheels_of
@@ -94,7 +95,11 @@ class MadeUpLink:
     process = "pilot"
 
     def __init__(self):
-        self.peers, self.reported = {"navigator"}, []
+        self.peers, self.reported, self.orders = {"navigator"}, [], []
+
+    def subscribe(self, topic):
+        assert topic == order.TOPIC
+        return SimpleNamespace(take=lambda timeout_s: [self.orders.pop(0) for _ in list(self.orders)])
 
     def publish(self, topic):
         return SimpleNamespace(send=self.reported.append, sent=0)
@@ -132,6 +137,22 @@ def test_without_a_heartbeat_the_wheels_stand_and_blocks_are_read(live):
     live.ring.bring(120)
     live.steps()
     assert live.base.drives == 2 and live.flight.interruptions[-1] == 119 and live.made.state == RUNNING
+
+
+def test_the_wheels_stand_while_a_person_wants_it_and_blocks_are_read(live):
+    def ordered(state):
+        return SimpleNamespace(message=messages.Behaviour(messages.Header.at(0), state, messages.Time(), "a person"))
+
+    live.link.orders = [ordered(order.HOLD), ordered("DANCE"), SimpleNamespace(message=messages.End(None, 1, ""))]
+    live.ring.bring(0, 10)
+    live.steps(3)
+    assert live.made._wheels.held and live.base.stops == 1 and live.flight.took == [0, 10] and not live.base.drives
+    assert live.made.state.startswith("stopped by a person") and live.made._last_error == ""
+    live.link.orders = [ordered(order.HOLD), ordered(order.GO)]
+    live.ring.bring(20)
+    live.steps(2)
+    assert not live.made._wheels.held and live.made.state == "running" and live.base.stops == 1
+    assert live.flight.interruptions == [19], "it begins again as after a base that was lost"
 
 
 def test_the_end_of_the_heartbeat_is_the_pilots(live):

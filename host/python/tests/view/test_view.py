@@ -252,7 +252,7 @@ def test_shared_memory_that_is_no_ring_is_refused_with_the_reason(tmp_path):
         ("nonsense", "not a JSON object"),
         ("[]", "not a JSON object"),
         ("[" * 4000, "not a JSON object"),
-        ('{"type": "delete"}', "type: not ack, subscribe, unsubscribe, set_pose or play"),
+        ('{"type": "delete"}', "type: not ack, subscribe, unsubscribe, set_pose, hold, record or play"),
         ('{"type": "subscribe", "topic": "arena"}', "topic: not one of traces, status, rings"),
         ('{"type": "subscribe", "topic": ["traces"]}', "topic: not one of"),
         ('{"type": "subscribe", "topic": "status", "ring": "../etc/passwd"}', "ring: not one of this machine"),

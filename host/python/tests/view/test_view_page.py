@@ -85,6 +85,7 @@ def test_counters_health_and_lanes_are_those_of_the_ring():
             ]
             health = await b.text("#health")
             assert "CB-0007" in health and f"1 (bridge), {WIRE_VERSION} (host)" in health and "± 1.5 µs" in health
+            await b.click("#rest")
             rows = await b.eval("[...document.querySelectorAll('#lanes tbody tr')].map((r) => r.innerText.trim())")
             assert len(rows) == 28 and rows[1].split()[:2] == ["1", "good"] and rows[1].endswith("12 !")
             assert rows[NODES].split() == [str(NODES), "absent"]

@@ -165,10 +165,10 @@ def test_words_are_those_of_the_messages():
             doing = await b.text("#behaviour")
             assert "Expects" in doing and "0.12 m2 of floor in 2.7 s" in doing
             assert "whisk in" in doing and "contact at <b>2</b>" in doing and "5.4 s" in doing
+            assert "last error: disk full" in await b.text("#processes")
+            await b.eval("document.querySelector('#processes details').open = true")
             processes = await b.text("#processes")
-            assert (
-                "bytes written 12" in processes and "last error: disk full" in processes and "process 99" in processes
-            )
+            assert "bytes written\n12" in processes and "process 99" in processes
             rows = await b.text("#rows")
             assert "254, exploring" in rows and [line for line in rows.splitlines() if line == "2"] == ["2", "2"]
             pose = await b.text("#pose")
@@ -255,7 +255,7 @@ def test_the_part_is_used_by_keyboard_and_fits_a_phone():
             assert await b.eval("document.documentElement.scrollWidth") == 390
             wanted = set(
                 await b.eval(
-                    "[...document.querySelectorAll('button, select, input')].filter((e) => e.checkVisibility()).map((e) => e.id)"
+                    "[...document.querySelectorAll('button, select, input')].filter((e) => e.checkVisibility() && !e.disabled).map((e) => e.id)"
                 )
             )
             seen = set()
@@ -275,7 +275,12 @@ def test_the_daemon_of_a_ring_on_this_machine_is_among_the_processes():
         async with serving(hub, "127.0.0.1", 0, []) as port, chromium.browser() as b:
             await b.look(f"http://127.0.0.1:{port}/")
             said = await b.until("$('processes').innerText.includes('ring ') && $('processes').innerText")
-            assert f"ring {writer.name}" in said and "frames 640" in said and "missing 0" in said
+            assert f"ring {writer.name}" in said and "640" not in said, "one line a process"
+            await b.eval("[...document.querySelectorAll('#processes details')].at(-1).open = true")
+            said = (await b.text("#processes")).split()
+            assert said[said.index("frames") + 1] == "640" and said[said.index("missing") + 1] == "0"
+            await b.until("$('processes').innerText.includes('last word')")
+            assert await b.eval("[...document.querySelectorAll('#processes details')].at(-1).open"), "it stays open"
 
     with ring_of(made_frames(0, 640)) as writer:
         asyncio.run(scenario(writer))

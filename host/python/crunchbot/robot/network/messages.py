@@ -194,6 +194,7 @@ TOPICS = {
     "touch_map": TouchMap,
     "truth": PoseStamped,
     "initial_pose": PoseWithCovarianceStamped,
+    "order": Behaviour,
 }
 HEALTH = "health"
 NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")  # of a process or a robot

@@ -188,6 +188,7 @@ def desktop(
         table.append(Program.of("bag", [*commands.bag(bag), "--stay", "--next", *everybody], reports=True))
     if view_port is not None:
         command = [*whisker("view"), *meeting.reading, "--robot", "--scene", body.scene, "--port", view_port]
+        command += ["--records", bag.parent] if bag else []
         table.append(Program.of("view", [*command, *everybody]))
     return table
 

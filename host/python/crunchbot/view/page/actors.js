@@ -15,16 +15,30 @@ class Actors {
     const pen = (this.pen = plan.live.getContext('2d'));
     pen.clearRect(0, 0, plan.live.width, plan.live.height);
     pen.save();
+    plan.clip(pen);
     if (layers.belief) world.belief.draw(plan, pen);
     if (layers.estimate) this.path(world.path, '--alpha', []);
     if (layers.truth) this.path(world.truth, '--beta', [7, 6]);
     if (layers.contacts) for (const surface of world.surfaces) this.surface(surface);
     if (layers.contacts) for (const contact of world.contacts) this.contact(contact);
     if (layers.estimate && world.word?.pose) this.robot(world.word.pose, '--alpha', [], world.word, world.stale);
+    if (layers.others) for (const other of world.word?.filters.slice(1) ?? []) this.other(other);
     if (layers.truth && world.word?.truth) this.robot(world.word.truth, '--beta', [6, 6], null);
     if (layers.belief) world.belief.drawHeadings(plan, pen);
     if (layers.belief) world.belief.drawShares(plan, pen);
     pen.restore();
+  }
+
+  /* Where another filter has the robot: a small ring, its heading and its name. */
+  other({ name, x, y, theta }) {
+    const { pen, plan } = this;
+    const [at, size] = [[plan.x(x), plan.y(y)], 6 * plan.ratio];
+    pen.beginPath();
+    pen.arc(...at, size, 0, 2 * Math.PI);
+    pen.moveTo(...at);
+    pen.lineTo(at[0] + 2 * size * Math.cos(theta), at[1] - 2 * size * Math.sin(theta));
+    this.stroke('--soft', 1.6, []);
+    plan.text(pen, name, at[0] + 1.6 * size, at[1] + 1.6 * size, '--ink', 11);
   }
 
   /* Points [t, x, y, theta, ...], with gaps where nothing was driven; a light edge keeps the line apart from what it crosses. */

@@ -22,6 +22,7 @@ const wire = new Wire((up) => {
 });
 const robotPart = new RobotPart(wire);
 const tour = new Tour();
+const controls = new Controls(wire, () => (parts.now === 'traces' ? { ring: view.ring } : {}));
 const parts = new Parts((part) => {
   robotPart.look(part === 'robot');
   if (traces) look();
@@ -93,6 +94,12 @@ function scale(step) {
   look();
 }
 
+/* Of the part that is looked at: the plan, or the time of the traces. */
+function nearer(is) {
+  if (parts.now === 'robot') $(is ? 'closer' : 'farther').click();
+  else scale(is ? -1 : 1);
+}
+
 function theme(name, chosen) {
   document.documentElement.dataset.theme = name;
   if (chosen) document.documentElement.dataset.chosen = 'yes';
@@ -119,6 +126,8 @@ wire.on('hello', (hello) => {
   panels.hello(hello);
   robotPart.poseTool.hello(hello);
   robotPart.player.hello(hello);
+  controls.hello(hello);
+  view.names = hello.lane_names;
   tour.hello(hello, wanted.has('tour'));
   if (hello.playback) parts.choose('robot', false);
   else if (!parts.chosen) parts.choose(hello.robot ? 'robot' : 'traces', false);
@@ -160,7 +169,7 @@ wire.on('traces', (block) => {
   if (history.take(block)) redraw();
 });
 
-wire.on('error', (error) => { if (!robotPart.poseTool.refused(error.text)) console.error(`whisker-view: ${error.text}`); });
+wire.on('error', (error) => { if (!robotPart.poseTool.refused(error.text) && !controls.refused(error.text)) console.error(`whisker-view: ${error.text}`); });
 
 /* What the bin under the cursor holds; `pointed`: the strip under the pointer, if any. */
 function readOut(bin, ago, pointed) {
@@ -193,7 +202,7 @@ $('axes').addEventListener('change', (event) => { view.axes = { both: [0, 1], al
 $('plot').addEventListener('pointermove', (event) => { const box = $('plot').getBoundingClientRect(); traces?.point(event.clientX - box.left, event.clientY - box.top); });
 $('plot').addEventListener('pointerleave', () => { if (traces) { traces.point(-1, -1); $('readout').textContent = ''; } });
 
-const KEYS = { r: () => parts.choose('robot', true), w: () => { if (!robotPart.player.on) parts.choose('traces', true); }, ' ': () => (robotPart.player.on ? robotPart.player.toggle() : pause(!paused)), '+': () => scale(-1), '=': () => scale(-1), '-': () => scale(1), a: () => $('all').click(), n: () => $('noded').click(), p: () => $('set-pose').click(), d: () => $('theme').click(), '?': () => $('help').click() };
+const KEYS = { r: () => parts.choose('robot', true), w: () => { if (!robotPart.player.on) parts.choose('traces', true); }, ' ': () => (robotPart.player.on ? robotPart.player.toggle() : pause(!paused)), '+': () => nearer(true), '=': () => nearer(true), '-': () => nearer(false), 0: () => $('whole').click(), c: () => $('record').click(), s: () => $('hold').click(), a: () => $('all').click(), n: () => $('noded').click(), p: () => $('set-pose').click(), d: () => $('theme').click(), '?': () => $('help').click() };
 addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || !traces) return;
   const inPlot = event.target === $('plot');

@@ -59,15 +59,25 @@ class Panels {
     this.kinds = hello.kinds;
     this.wireVersion = hello.wire_version;
     if (this.rows) return;
-    this.rows = Array.from({ length: hello.lanes }, (_, lane) => this.makeLane(lane));
+    this.rows = Array.from({ length: hello.lanes }, (_, lane) => this.makeLane(lane, hello.lane_names[lane]));
     $('lanes').tBodies[0].append(...this.rows.map((row) => row.line));
+    $('rest').addEventListener('click', () => { $('lanes').dataset.rest = $('lanes').dataset.rest === 'shown' ? 'hidden' : 'shown'; this.showRest(); });
   }
 
-  makeLane(lane) {
+  /* Lanes without a node: one line, until they are asked for, or one of them is ticked. */
+  showRest() {
+    const rest = this.rows.filter((row) => row.line.dataset.state === 'empty').length;
+    const shown = $('lanes').dataset.rest === 'shown';
+    $('rest').hidden = !rest;
+    $('rest').setAttribute('aria-expanded', shown);
+    $('rest').textContent = shown ? 'Hide lanes without a node' : `Show ${rest} lanes without a node`;
+  }
+
+  makeLane(lane, name) {
     const box = make('input', [], { type: 'checkbox', id: `lane-${lane}` });
     box.addEventListener('change', () => this.onLanes(this.rows.flatMap((row, n) => (row.box.checked ? [n] : []))));
     const cells = [make('td'), make('td'), make('td'), make('td')];
-    const line = make('tr', [make('th', make('label', [box, String(lane)]), { scope: 'row' }), ...cells]);
+    const line = make('tr', [make('th', make('label', [box, String(lane), ...(name ? [make('small', ` ${words(name)}`)] : [])]), { scope: 'row' }), ...cells]);
     return { box, cells, line };
   }
 
@@ -153,6 +163,7 @@ class Panels {
       row.cells.forEach((cell, n) => { if (cell.textContent !== texts[n]) cell.textContent = texts[n]; });
       row.cells[3].className = lost ? 'loss' : '';
     });
+    this.showRest();
   }
 
   showKinds(bad) {

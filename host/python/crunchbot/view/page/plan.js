@@ -18,13 +18,14 @@ class Plan {
     this.scene = null; // as topic scene holds it
     this.map = null; // as topic map holds it: in the arena's place, for it has a frame of its own
     this.mapLayer = new MapLayer(this);
-    this.bounds = [0, 0, 1, 1];
+    this.whole = this.bounds = [0, 0, 1, 1]; // all of it, and what is shown
+    this.zoom = { factor: 1, x: 0.5, y: 0.5 }; // x, y: the middle
     new ResizeObserver(() => { if (box.clientWidth && box.clientWidth !== this.wide) this.layOut(); }).observe(box);
   }
 
   show(scene) {
     this.scene = scene;
-    if (scene.arena && !this.map) this.bounds = arenaBounds(scene);
+    if (scene.arena && !this.map) this.whole = arenaBounds(scene);
     this.layOut();
   }
 
@@ -33,9 +34,9 @@ class Plan {
   /* A map that grows, in place of the arena; null: the arena again. */
   showMap(map) {
     const wanted = map ? mapBounds(map) : this.scene?.arena ? arenaBounds(this.scene) : [0, 0, 1, 1];
-    const fits = Boolean(map) === Boolean(this.map) && wanted.every((value, n) => value === this.bounds[n]);
+    const fits = Boolean(map) === Boolean(this.map) && wanted.every((value, n) => value === this.whole[n]);
     this.map = map;
-    this.bounds = wanted;
+    this.whole = wanted;
     if (fits && this.scale) this.drawFloor();
     else this.layOut();
   }
@@ -45,24 +46,42 @@ class Plan {
     if (this.map || this.scene?.arena || !points.length) return;
     const side = (axis, round, pick) => round(pick(...points.slice(-500).map((p) => p[axis])) / 0.5 + (round === Math.ceil ? 1 : -1)) * 0.5;
     const wanted = [side(0, Math.floor, Math.min), side(1, Math.floor, Math.min), side(0, Math.ceil, Math.max), side(1, Math.ceil, Math.max)];
-    const inside = wanted[0] >= this.bounds[0] && wanted[1] >= this.bounds[1] && wanted[2] <= this.bounds[2] && wanted[3] <= this.bounds[3];
+    const inside = wanted[0] >= this.whole[0] && wanted[1] >= this.whole[1] && wanted[2] <= this.whole[2] && wanted[3] <= this.whole[3];
     if (inside && this.fitted) return;
     this.fitted = true;
-    this.bounds = wanted;
+    this.whole = wanted;
     this.layOut();
+  }
+
+  /* So many times as large as the whole, with this place, m, in the middle as far as the whole reaches. */
+  look(factor, x, y) {
+    this.zoom = { factor, x, y };
+    this.layOut();
+  }
+
+  /* What of the whole is shown. */
+  window() {
+    const [x0, y0, x1, y1] = this.whole;
+    const { zoom } = this;
+    const middle = (at, low, high) => Math.min(Math.max(at, low + (high - low) / 2 / zoom.factor), high - (high - low) / 2 / zoom.factor);
+    [zoom.x, zoom.y] = [middle(zoom.x, x0, x1), middle(zoom.y, y0, y1)];
+    if (zoom.factor === 1) return this.whole;
+    const [wide, high] = [(x1 - x0) / 2 / zoom.factor, (y1 - y0) / 2 / zoom.factor];
+    return [zoom.x - wide, zoom.y - high, zoom.x + wide, zoom.y + high];
   }
 
   layOut() {
     this.ratio = devicePixelRatio || 1;
     this.wide = this.box.clientWidth;
+    this.bounds = this.window();
     if (!this.wide) return;
-    const [x0, y0, x1, y1] = this.bounds;
+    const [x0, y0, x1, y1] = this.whole;
     const [across, up] = [this.wide - PLAN.left - PLAN.edge, Math.max(PLAN.least, innerHeight - PLAN.head) - PLAN.edge - PLAN.foot];
     const scale = Math.min(across / (x1 - x0), up / (y1 - y0));
     const high = PLAN.edge + scale * (y1 - y0) + PLAN.foot;
     this.box.style.height = `${high}px`;
     for (const canvas of [this.floor, this.live]) [canvas.width, canvas.height] = [Math.round(this.wide * this.ratio), Math.round(high * this.ratio)];
-    this.scale = scale * this.ratio; // px of the device per metre
+    this.scale = scale * this.ratio * this.zoom.factor; // px of the device per metre
     this.left = (PLAN.left + (across - scale * (x1 - x0)) / 2) * this.ratio;
     this.bottom = (PLAN.edge + scale * (y1 - y0)) * this.ratio;
     this.drawFloor();
@@ -78,21 +97,21 @@ class Plan {
   drawFloor() {
     const pen = this.floor.getContext('2d');
     pen.clearRect(0, 0, this.floor.width, this.floor.height);
-    if (this.map) this.drawMap(pen);
+    pen.save();
+    this.clip(pen);
+    if (this.map) this.mapLayer.draw(pen, this.map);
     if (this.arena) this.drawArena(pen, this.arena);
+    pen.restore();
     this.drawAxes(pen);
     this.drawScale(pen);
   }
 
-  /* Nothing of it outside the axes. */
-  drawMap(pen) {
-    const [x0, y0, x1, y1] = this.bounds;
-    pen.save();
+  /* From here on nothing outside the axes, but for what walls and a robot at them need. */
+  clip(pen) {
+    const [[x0, y0, x1, y1], edge] = [this.bounds, this.zoom.factor > 1 || this.map ? 0 : PLAN.edge * this.ratio];
     pen.beginPath();
-    pen.rect(this.left, this.y(y1), (x1 - x0) * this.scale, (y1 - y0) * this.scale);
+    pen.rect(this.left - edge, this.y(y1) - edge, (x1 - x0) * this.scale + 2 * edge, (y1 - y0) * this.scale + 2 * edge);
     pen.clip();
-    this.mapLayer.draw(pen, this.map);
-    pen.restore();
   }
 
   /* In the arena's frame, which has a place on the map. */
@@ -168,7 +187,7 @@ class Plan {
     for (const x of ticks(x0, x1)) this.text(pen, axis(x), this.x(x), this.bottom + 11 * this.ratio, '--soft', 11, 'center');
     for (const y of ticks(y0, y1)) this.text(pen, axis(y), this.left - 5 * this.ratio, this.y(y), '--soft', 11, 'right');
     pen.strokeStyle = this.css('--ink');
-    const walls = this.arena && !this.scene.origin[2];
+    const walls = this.arena && !this.scene.origin[2] && this.zoom.factor === 1;
     pen.lineWidth = (walls ? 2 : 1) * this.ratio;
     if (!walls) pen.setLineDash([2 * this.ratio, 4 * this.ratio]); // what is shown, not walls
     pen.strokeRect(this.left, this.y(y1), (x1 - x0) * this.scale, (y1 - y0) * this.scale);

@@ -1,6 +1,6 @@
 /* The part of the page that shows the whole robot: keeps what came, draws at most once a picture, shows it while it is looked at. */
 const POINTS_MOST = 3000; // of a path: 5 min at 10 Hz
-const LAYERS = ['belief', 'estimate', 'truth', 'contacts'];
+const LAYERS = ['belief', 'estimate', 'truth', 'contacts', 'others'];
 
 class RobotPart {
   constructor(wire) {
@@ -14,6 +14,7 @@ class RobotPart {
     this.wire = wire;
     this.poseTool = new PoseTool(this.plan, wire, () => this.redraw());
     this.player = new Player(wire);
+    this.zoom = new Zoom(this.plan, this.poseTool, () => { const pose = this.world.word?.pose; return pose && [pose.x, pose.y]; });
     wire.on('scene', (scene) => this.showScene(scene));
     wire.on('robot', (word) => this.take(word));
     wire.on('belief', (message) => this.takeBelief(message));
@@ -111,7 +112,9 @@ class RobotPart {
     else if (!advice) this.pill(flow?.state ?? 'live', flow?.pill ?? '● live');
     else if (word.heard_s !== null) this.pill('stalled', '▲ silent');
     else this.pill('waiting', word.link.state === 'off' ? '○ no robot' : '○ not heard yet');
+    this.sure(word);
     tellPose(word, this.world.belief);
+    tellFilters(word);
     tellBehaviour(word);
     tellRow(word);
     tellContacts(word, this.world.contacts);
@@ -126,6 +129,15 @@ class RobotPart {
   pill(state, text) {
     $('robot-state').dataset.state = state;
     if ($('robot-state').textContent !== text) $('robot-state').textContent = text;
+  }
+
+  /* The header's word for how sure the robot is. */
+  sure(word) {
+    const reported = word.heard_s === null ? null : sureness(word, this.world, this.ring);
+    $('sure').hidden = !reported;
+    if (!reported) return;
+    $('sure').dataset.state = reported[0];
+    if ($('sure').textContent !== reported[1]) $('sure').textContent = reported[1];
   }
 
   note(reported) {

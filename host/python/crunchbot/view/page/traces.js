@@ -212,10 +212,25 @@ class Traces {
   drawCursor() {
     const pen = this.marker.getContext('2d');
     pen.clearRect(0, 0, this.marker.width, this.marker.height);
+    this.drawNames(pen);
     if (this.column === null) return;
     pen.fillStyle = this.css('--ink');
     pen.fillRect(this.marker.width - 1 - this.column, 0, 1, this.marker.height - FOOT * this.ratio);
     this.onRead?.(this.history.end - 1 - this.column, this.column * this.history.width * this.view.tickS, this.pointed);
+  }
+
+  /* The lanes' names, over the curves. */
+  drawNames(pen) {
+    for (const { lane, top, first } of this.strips) {
+      const name = first && this.view.names?.[lane];
+      if (!name) continue;
+      const [left, px] = [(GUTTER + 4) * this.ratio, this.ratio];
+      pen.font = `${11 * px}px system-ui, "DejaVu Sans", sans-serif`;
+      pen.fillStyle = this.css('--card');
+      pen.fillRect(left - 2 * px, top + px, pen.measureText(words(name)).width + 4 * px, 13 * px);
+      pen.textBaseline = 'middle';
+      this.text(pen, words(name), left, top + 8 * px, '--ink', 11);
+    }
   }
 
   /* Puts the cursor under a pointer at (x, y) px of the box, or takes it away. */

@@ -34,6 +34,16 @@ function tellPose(word, belief) {
   ]);
 }
 
+/* Each filter's answer beside the others'; the first is the robot's. */
+function tellFilters({ filters, truth }) {
+  $('filters-card').hidden = $('others-legend').hidden = filters.length < 2;
+  retell($('filters'), [filters, truth], () => filters.map((f, nth) => {
+    const off = truth ? signed(Math.hypot(f.x - truth.x, f.y - truth.y), 2) : 'not known';
+    const cells = [signed(f.confidence, 2), signed(f.sigma_m, 2), off];
+    return make('tr', [make('th', nth ? f.name : `${f.name}, the robot’s`, { scope: 'row' }), ...cells.map((cell) => make('td', cell))]);
+  }));
+}
+
 function tellMap(map) {
   const { faces, tiles, area, corners } = mapSaid(map);
   pairsOf($('map'), [['Faces', faces], ['Corners', corners], ['Floor', tiles], ['Ground', area], ['As of row', count(map.seq)], ['Part of the run', map.part ? `${map.part + 1}, after ${map.part === 1 ? 'a kidnap' : `${map.part} kidnaps`}` : 'the first']]);
@@ -89,9 +99,13 @@ function tellContacts(word, contacts) {
   });
 }
 
+/* A line each; what is opened stays open. */
 function tellProcesses(word, ring) {
   const reported = ring && ring.state !== 'waiting' ? [...word.processes, ringProcess(ring)] : word.processes;
-  retell($('processes'), reported, () => (reported.length ? reported.map(processCard) : [make('li', none('no process has reported of itself'))]));
+  const list = $('processes');
+  const names = reported.map((process) => process.name);
+  retell(list, names, () => (names.length ? names.map(() => make('li', [make('details', [make('summary'), make('div')]), make('div', '', { class: 'fault' })])) : [make('li', none('no process has reported of itself'))]));
+  reported.forEach((process, nth) => tellProcess(list.children[nth], process));
 }
 
 /* The daemon behind the ring that the other part shows, if that ring is on this machine, in the words of topic robot. */
@@ -100,15 +114,18 @@ function ringProcess(s) {
   return { name: `ring ${s.ring}`, pid: s.reader?.writer_pid, state: words(s.state), age_s: s.age_s === null ? null : Math.floor(s.age_s), silent: s.state === 'stalled', ended: s.state === 'ended', restarts: s.restarts, counters, error: s.trouble?.text ?? '' };
 }
 
-function processCard(p) {
+function tellProcess(line, p) {
   const never = p.age_s === null;
+  const [summary, details] = line.firstChild.children;
   const state = p.ended ? `■ ${p.state}` : never ? '○ never heard' : p.silent ? `▲ silent for ${duration(p.age_s)}` : `● ${p.state || 'state not reported'}`;
+  line.dataset.state = never || p.ended ? 'never' : p.silent ? 'silent' : 'heard';
+  retell(summary, [p.name, state], () => [make('b', p.name), make('span', state, { class: 'condition' })]);
   const facts = [p.pid ? `process ${p.pid}` : '', p.restarts ? `restarted ${p.restarts} ×` : '', never ? '' : `last word ${ago(p.age_s)}`].filter(Boolean).join(', ');
-  const counters = Object.entries(p.counters).map(([key, value]) => make('span', [`${words(key)} `, make('b', value)]));
-  const parts = [make('div', [make('b', p.name), make('span', state, { class: 'condition' })]), make('small', facts)];
-  if (counters.length) parts.push(make('div', counters, { class: 'counters' }));
-  if (p.error) parts.push(make('div', `! last error: ${p.error}`, { class: 'fault' }));
-  return make('li', parts, { 'data-state': never || p.ended ? 'never' : p.silent ? 'silent' : 'heard' });
+  retell(line.lastChild, p.error, () => (p.error ? [`! last error: ${p.error}`] : []));
+  retell(details, [facts, p.counters], () => [
+    make('small', facts),
+    make('dl', Object.entries(p.counters).flatMap(([key, value]) => [make('dt', words(key)), make('dd', value)]), { class: 'pairs' }),
+  ]);
 }
 
 /* [grave, headline, line, steps] for the note above the plan; null when all is heard. */
