@@ -54,8 +54,8 @@ def test_the_header_says_how_sure_the_robot_is_and_why(shares, blind, rows, stat
     async def scenario():
         async with looking_at(Post(), run=ToldRun(shares, blind), rows=rows, clock=Clock()) as (b, _):
             await b.until(DRAWN)
-            told = await b.until(SURE)
-            assert told[0] == state and told[1].startswith(said)
+            reported = await b.until(SURE)
+            assert reported[0] == state and reported[1].startswith(said)
             assert await b.eval("$('sure').checkVisibility()")
             await b.press("w")
             assert not await b.eval("$('sure').checkVisibility()")

@@ -1,6 +1,6 @@
 /* How sure the robot is of its place, and why. */
 const SURE = 0.9; // of the belief near the estimate: the share that the regions of 90 % are drawn for
-const LOST = 0.5; // less is near the estimate than elsewhere
+const LOST = 0.5; // less is near the estimate than in all other places
 const UNREAD_S = 5; // rows of 0.1 s without a reading come in every run: a whisk takes some seconds
 
 /* [level, text] for the header; null: no pose is known. `ring`: topic status, undefined where none is looked at. */
