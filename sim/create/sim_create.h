@@ -9,7 +9,7 @@
  * As on the robot: sensors are renewed every 15 ms; packets 19 and 20 count from the time they were last read; bytes
  * leave at the pace of the line, so a stream frame that does not fit into 15 ms is overwritten by the next one; an
  * incomplete command waits for its bytes; safe mode falls back to passive; Create 2 turns its wheels in steps.
- * Numbers of the interface: protocol/create_oi.h. What it leaves out: README.md.
+ * Numbers of the interface: protocol/create_oi.h. What it leaves out: sim/README.md.
  */
 #ifndef SIM_CREATE_H
 #define SIM_CREATE_H

@@ -1,6 +1,6 @@
 """A short drill: whatever is killed, cut off or dies comes back, the wheels are stopped meanwhile, and what is lost is reported.
 
-How long each took is for `make test-all` to judge (tests/drills/README.md).
+How long each took is for `make test-all` to judge (docs/results/drills.md).
 """
 
 from dataclasses import replace

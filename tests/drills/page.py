@@ -1,4 +1,4 @@
-"""bench/results/drills.json and the table of tests/drills/README.md, of one or more runs.
+"""bench/results/drills.json and the table of docs/results/drills.md, of one or more runs.
 
 PYTHONPATH=tests:tools python -m drills.page build/drills/seed3/drills.json ...
 """
@@ -17,7 +17,7 @@ from .faults import FAULTS
 from .witness import NEAR_M
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "tests/drills/README.md"
+PAGE = ROOT / "docs/results/drills.md"
 BEGIN, END = "<!-- table: written by tests/drills/page.py -->", "<!-- end -->"
 HEADER = (
     "| fault | times | stop, s: median, worst | all answer, s: median, worst | near again, s: median, worst | lost | reported "

@@ -70,7 +70,7 @@ FIGURES = (
     Figure("docs/using.md", r"rosbags [\d.]+ \| (\d+) % \| (\d+) \|", "damage", damaged("rosbags")),
     Figure("docs/using.md", r"Of (\d+) damaged files", "damage", lambda d: (str(d["files"]),)),
     Figure(
-        "tests/drills/README.md",
+        "docs/results/drills.md",
         r"(\d+)\s+faults, (\d+) with failures.*?median\s+([\d.]+) m, p90\s+([\d.]+) m,\s+([\d.]+) %",
         "drills",
         drill_errors,

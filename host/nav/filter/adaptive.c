@@ -5,7 +5,7 @@
  * kidnapped; the filter keeps both beliefs, weighted by how well they explained those rows. Pose unknown: the histogram
  * alone, until its mass lies in few enough cells for a cloud. While there are several modes it stays active beside the
  * cloud and sets their weights. Work per row is bounded by adaptive.budget in every state: what the histogram has not
- * done waits for the next row. docs/navigation_adaptive.md describes it. */
+ * done waits for the next row. docs/methods/localisation.md describes it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -29,8 +29,8 @@ enum { RUNS = 200, PACKETS = 4, RUN_S = 60, TICKS_PER_S = 2000, CHUNK = 256, FOR
 static const uint8_t packets[PACKETS] = {CREATE_OI_DISTANCE, CREATE_OI_ANGLE, CREATE_OI_REQUESTED_RIGHT,
                                          CREATE_OI_REQUESTED_LEFT};
 
-/* What an exploring robot orders in turn (docs/behaviour.md): mm/s of the right and the left wheel, how long, s, and
- * whether only where something was met. Turns go to either side. */
+/* What an exploring robot orders in turn (docs/methods/behaviour.md): mm/s of the right and the left wheel, how
+ * long, s, and whether only where something was met. Turns go to either side. */
 static const struct move {
     int32_t right, left;
     double least_s, most_s;

@@ -1,6 +1,6 @@
 """Random exploration with the paper's body whisk, as a plain state machine: contacts and odometry in, wheel speeds out.
 
-What leads from which state to which is a table (`rules.RULES`), drawn in docs/behaviour.md.
+What leads from which state to which is a table (`rules.RULES`), drawn in docs/methods/behaviour.md.
 
 A contact that begins in a turn is not whisked at: the tip then meets a face at a slant, and its bending would say
 nothing about the distance.

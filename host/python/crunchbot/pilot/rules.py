@@ -1,6 +1,6 @@
 """The behaviour as a table: in which state, on what condition, what happens and which state begins; and each state's speeds.
 
-A condition's name, underscores aside, is what the picture in docs/behaviour.md says of its arrow. The first rule that holds is taken, one per block; rules of any state stand first.
+A condition's name, underscores aside, is what the picture in docs/methods/behaviour.md says of its arrow. The first rule that holds is taken, one per block; rules of any state stand first.
 """
 
 from collections.abc import Callable
