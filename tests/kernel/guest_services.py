@@ -113,7 +113,7 @@ def boots(_: Checks) -> str:
 
 
 def users(_: Checks) -> str:
-    """After an install by hand, as docs/using.md says: sysusers makes the users, who cannot log in."""
+    """After an install by hand, as docs/install.md says: sysusers makes the users, who cannot log in."""
     command("systemd-sysusers")
     command("udevadm", "control", "--reload")
     command("systemctl", "daemon-reload")

@@ -51,6 +51,14 @@ def drill_errors(data: dict) -> tuple[str, ...]:
     return *faults, f"{run['error_p50_m']:.3f}", f"{run['error_p90_m']:.3f}", share
 
 
+def half_hours(data: dict) -> tuple[str, ...]:
+    assert len(data) == 4
+    medians, most, lost = (
+        max(run["filters"]["adaptive"][key] for run in data.values()) for key in ("median_m", "max_m", "lost_share")
+    )
+    return f"{1e3 * medians:.0f}", cm(most), f"{100 * lost:.1f}"
+
+
 FIGURES = (
     Figure(
         "README.md",
@@ -59,16 +67,22 @@ FIGURES = (
         lambda d: tuple(cm(d[f"{name}_error_median_m"]) for name in ("pose", "adaptive", "foveal", "odometry")),
     ),
     Figure(
-        "docs/walkthrough.md",
+        "README.md",
+        r"four\s+runs.*?at\s+most\s+(\d+)\s+mm.*?worst\s+it\s+was\s+(\d+)\s+cm.*?for\s+([\d.]+)\s+%",
+        "robot_long",
+        half_hours,
+    ),
+    Figure(
+        "docs/first_drive.md",
         r"the\s+demo's\s+median\s+error\s+is\s+(\d+)\s+cm",
         "demo",
         lambda d: (cm(d["adaptive_error_median_m"]),),
     ),
-    Figure("docs/using.md", r"`crunchbot.recording` \| (\d+) % \| (\d+) \|", "damage", damaged("whisker")),
-    Figure("docs/using.md", r"front to back \| (\d+) % \| (\d+) \|", "damage", damaged("mcap, stream")),
-    Figure("docs/using.md", r"by the index \| (\d+) % \| (\d+) \|", "damage", damaged("mcap, indexed")),
-    Figure("docs/using.md", r"rosbags [\d.]+ \| (\d+) % \| (\d+) \|", "damage", damaged("rosbags")),
-    Figure("docs/using.md", r"Of (\d+) damaged files", "damage", lambda d: (str(d["files"]),)),
+    Figure("docs/record.md", r"`crunchbot.recording` \| (\d+) % \| (\d+) \|", "damage", damaged("whisker")),
+    Figure("docs/record.md", r"front to back \| (\d+) % \| (\d+) \|", "damage", damaged("mcap, stream")),
+    Figure("docs/record.md", r"by the index \| (\d+) % \| (\d+) \|", "damage", damaged("mcap, indexed")),
+    Figure("docs/record.md", r"rosbags [\d.]+ \| (\d+) % \| (\d+) \|", "damage", damaged("rosbags")),
+    Figure("docs/record.md", r"Of (\d+) damaged files", "damage", lambda d: (str(d["files"]),)),
     Figure(
         "docs/results/drills.md",
         r"(\d+)\s+faults, (\d+) with failures.*?median\s+([\d.]+) m, p90\s+([\d.]+) m,\s+([\d.]+) %",

@@ -44,10 +44,11 @@ FILES = {  # what the pages' commands read, by what stands for it
 LOG, LOG_ROWS = "recordings/random_1", 30  # a Thymio's
 # What a command prints, or FOREVER: it runs until Ctrl-C. In this order: some write what others read.
 ON_FILES = {
-    "whisker scene make --list-families": "anchor",
     "whisker scene make --family robot --seed 1 --out scenes/mine": ": robot, seed 1",
     "whisker scene make --family free+kidnap+outliers --seed 7 --out scenes/7": "scenes/7: free+kidnap+outliers, seed 7",
     "whisker localise scenes/run1 --filter grid --out est.csv": "",
+    "whisker localise examples/scene": "adaptive",
+    "whisker localise scenes/7 --filter grid": "grid",
     "whisker localise SCENE --map room.yaml --json": '"pose_error_median_m"',
     "whisker export drive.mcap drive.csv": "drive.csv: 4000 frames",
     "whisker export drive.mcap drive.nwb": "drive.nwb: 4000 frames",
@@ -72,9 +73,7 @@ WITH_BRIDGE = {
     "whisker doctor": " frames in ",
     "whisker top --scene scenes/mine --once": "lane",
     "whisker stream --lanes 0,1 --frames 16000": "",
-    "whisker record drive.mcap --seconds 60": "frames",
     "whisker record drive.mcap --seconds 60 --scene scenes/robot": "frames",
-    "whisker replay drive.mcap --ring replayed": "frames",
     "whisker replay drive.mcap --ring replayed --speed 2": "frames",
     "whisker-view --open": FOREVER,
 }
@@ -91,7 +90,6 @@ WITHOUT_HARDWARE = {
     "whisker-base --port /dev/ttyUSB0 --socket base.sock": "there is no such port; plug the adapter in",
     "whisker-base --port /dev/ttyUSB0 --socket base.sock --verbose": "there is no such port; plug the adapter in",
     "whisker-view --ring a --ring b": "http://127.0.0.1:",
-    "whisker-view --ring replayed --port 0": "http://127.0.0.1:",
     "whisker-view --robot --connect tcp/robot.local:7458": "http://127.0.0.1:",
     "whisker-view --robot --connect tls/robot.local:7458 --zenoh-config FILE": "http://127.0.0.1:",
     "whisker-view --robot --scene SCENE": "http://127.0.0.1:",
@@ -125,7 +123,6 @@ REASONS = {
         "whisker robot scenes/mine --simulated --desktop --seconds 120 --out try",  # tests/drills run it whole
         "whisker view robot-run/robot.mcap",  # host/python/tests/view/test_view_playback.py
         "whisker-base --port /tmp/create --socket base.sock",  # host/python/tests/pilot/test_base_emulator.py
-        "whisker scene from build/demo --out scenes/demo",  # lab/tests/scenes/test_scenes.py reads a smaller run
         "whisker scene from rosbag2_2026_11_28 --scene SCENE --out scenes/run",  # host/python/tests/robot/bags/test_robot_rosbags.py
     ),
     "needs a person who sets contacts; tests/chain/test_calibrate_chain.py has a post in their place": (
