@@ -22,7 +22,6 @@ FILES = {  # what the pages' commands read, by what stands for it
     "contacts.csv": "examples/contacts.csv",
     "calibration/lane2.csv": "examples/contacts.csv",
     "calibration/object_2.csv": "examples/contacts.csv",
-    "model.json": "examples/radial.json",
     "models/texture.json": "examples/texture.json",
     "texture.json": "examples/texture.json",
     "new.csv": "examples/surfaces/ROUGH/1.csv",
@@ -58,7 +57,6 @@ ON_FILES = {
     "whisker radial predict lane2.json contacts.csv --json": '"radius_mm": ',
     "whisker radial fit calibration/lane2.csv --model whisk --out whisk2.json": "whisk",
     "whisker radial follow whisk2.json contacts.csv": "body whisk",
-    "whisker radial follow model.json contacts.csv --json": '"motion": "body whisk"',
     "whisker texture classify models/texture.json textures/ROUGH/left_ROUGH1.csv": "ROUGH",
     "whisker texture classify texture.json new.csv": "ROUGH",
     "whisker flash firmware/images/node.whex": "no bridge is connected",
@@ -127,7 +125,6 @@ REASONS = {
     ),
     "needs a person who sets contacts; tests/chain/test_calibrate_chain.py has a post in their place": (
         "whisker calibrate --out calibration --lane 2 --radii 90,100,110,120,130",
-        "whisker calibrate --lane 2 --radii 90,100,110,120,130,138 --repeats 5 --whisk-rad-s 0.1309 --out calibration",
         "whisker calibrate --out calibration --scene scenes/mine --nodes nodes.txt --lane 3 --radii "
         "90,100,110,120,130,138 --repeats 5 --whisk-rad-s 0.1309",
     ),

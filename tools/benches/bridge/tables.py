@@ -8,11 +8,11 @@ WAYS, CELLS = ("out_ns", "in_ns", "through_ns"), ("LUT", "FF", "block RAM", "dis
 GOAL_MHZ = 60.0
 
 
-def placed() -> str:
-    """The default command of every board at every number of lanes that has been placed."""
+def placed(*lanes: str) -> str:
+    """The default command of every board at these numbers of lanes."""
     rows = []
     for board in (board for _, board in sorted(read_result("bridge")["boards"].items())):
-        for run in (run for run in board["runs"] if "seed" in run):
+        for run in (run for run in board["runs"] if "seed" in run and str(run["lanes"]) in lanes):
             ways = [f"{run[way]:.1f} of {board['limits'][way]:.1f} ns" if board["limits"] else "-" for way in WAYS]
             least = board["least"].get("shortest_in_ns")
             rows.append(
@@ -43,13 +43,6 @@ def levels() -> str:
             [str(runs[0]["lanes"]), *(f"{f:.3g}" for f in factors), *(f"{factors[0] / f:.3g}" for f in factors[1:])]
         )
     return table(["lanes", *found, *(f"{first} / {other}" for other in others)], rows)
-
-
-def usb() -> str:
-    bad = ("gaps", "duplicates", "wrong", "stale", "answered", "unexplained", "hangs")
-    found = read_result("usb_soak")
-    names = ("seeds", "frames", "packets", "wire_faults", "noise", "restarts", "resets", *bad)
-    return table(["what", "count"], [[name, str(found[name])] for name in names])
 
 
 def demo_errors() -> str:

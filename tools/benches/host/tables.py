@@ -36,22 +36,6 @@ def ring(mode: str) -> str:
     return table([*head, f"frames a second to every reader: {counts}"], lines)
 
 
-def ring_ratio(mode: str) -> str:
-    """The ring against the best of the others."""
-    rows, readers = found()
-
-    def ratio(pace: str, n: int, value, best) -> str:
-        figures = {p: value(rows[p, mode, pace, n]) for p in TRANSPORTS if (p, mode, pace, n) in rows}
-        return f"{figures.pop('whisker') / best(figures.values()):.2f}"
-
-    lines = [
-        [str(n), ratio("2khz", n, lambda row: row["latency_us"]["p50"], min)]
-        + [ratio("flat", n, lambda row: row["delivered_per_s"], max)]
-        for n in readers
-    ]
-    return table(["readers", "p50, ring / best", "frames a second, ring / best"], lines)
-
-
 def writer() -> str:
     rows, readers = found()
     lines = [

@@ -1,7 +1,7 @@
 """Tables of docs/results/mechanics.md."""
 
 from ..store import read_result
-from ..tables import lined, table
+from ..tables import table
 
 
 def summary() -> str:
@@ -22,20 +22,4 @@ def summary() -> str:
             ["in these `static` agrees with 20 links", f"{edges['static_met']}"],
             ["in these `modes` agrees with 20 links", f"{edges['modes_met']}"],
         ],
-    )
-
-
-def edges() -> str:
-    held = "{%s[held_s]:1e3*.1f}, {%s[peak]:1e6*.1f}"
-    return lined(
-        read_result("mechanics")["at_edges"],
-        {"step mm": "{height_mm:g}", "m/s": "{speed:g}"}
-        | {
-            f"{name.replace('chain_', '')} held, peak": held % (name, name)
-            for name in ("static", "modes", "chain_20", "chain_40")
-        }
-        | {
-            name: lambda row, name=name: "agrees" if row[f"{name}_agrees"] else "differs"
-            for name in ("static", "modes")
-        },
     )

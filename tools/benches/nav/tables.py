@@ -10,21 +10,6 @@ OURS = localise.default_filter()
 PEER = ("filterpy", "particles", "pfilter", "mrpt")  # the first words of other projects' filters
 
 
-def pareto() -> str:
-    return lined(
-        named(read_result("nav_pareto"), "family", "filter"),
-        {
-            "family": "{family}",
-            "filter": "{filter}",
-            "runs": "{runs}",
-            "us/step": "{us:.3g}",
-            "p99 us": "{us_p99:.3g}",
-            "median error mm (middle half)": "{error_m:1e3*.1f} ({error_low_m:1e3*.1f}-{error_high_m:1e3*.1f})",
-            "RMS mm": "{rms_m:1e3*.1f}",
-        },
-    )
-
-
 def dominated() -> str:
     """By family: the points that are at least as quick and as near as the default filter."""
     rows, peers = [], read_result("nav_peers")
@@ -35,37 +20,6 @@ def dominated() -> str:
         better = [p["filter"] for p in theirs if p["step_us_median"] <= us and p["error_median_m"] <= error]
         rows.append([family, ", ".join(better) or ("none" if theirs else "not run"), ", ".join(mine) or "none"])
     return table(["family", "of other projects", "of our own filters"], rows)
-
-
-def peers() -> str:
-    return lined(
-        read_result("nav_peers"),
-        {
-            "family": "{family}",
-            "filter": "{filter} {setting}",
-            "runs": "{seeds}",
-            "us/step": "{step_us_median:.3g}",
-            "p99 us": "{step_us_p99:.3g}",
-            "median error mm": "{error_median_m:1e3*.1f}",
-            "RMS mm": "{error_rms_m:1e3*.1f}",
-            "never locked, %": "{lost_share:100*.0f}",
-        },
-    )
-
-
-def matrix() -> str:
-    rows = named(read_result("nav_matrix")["rows"], "row")
-    names = [key for key in rows[0] if key != "row"]
-
-    def of(name: str):
-        def shown(row: dict) -> str:
-            c = row[name]
-            held = "-" if c["coverage_90"] is None else f"{100 * c['coverage_90']:.0f} %"
-            return f"{100 * c['near_at_end']:.0f} %, {100 * c['error_m']:.1f}, {held}"
-
-        return shown
-
-    return lined(rows, {"row": "{row}"} | {name: of(name) for name in names})
 
 
 def stability() -> str:
@@ -153,9 +107,9 @@ def map_peers() -> str:
     )
 
 
-def floors() -> str:
+def floors(*filters: str) -> str:
     return lined(
-        named(read_result("floors"), "log", "filter"),
+        [run for run in named(read_result("floors"), "log", "filter") if run["filter"] in filters],
         {
             "log": "{log}",
             "filter": "{filter}",

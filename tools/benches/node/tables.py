@@ -4,7 +4,7 @@ from ..store import read_result
 from ..tables import lined, named, table
 from .image import HANDLERS
 
-FATES = {1: "the old image", 2: "the loader", 4: "the new image"}
+LOST = ((0, 0), (1, 1), (2, 2), (3, 10), (11, 50), (51, 300))  # groups of ticks
 MHZ = 38.6925  # instructions a microsecond
 
 
@@ -13,44 +13,21 @@ def spread(values: list[int]) -> str:
 
 
 def faults() -> str:
-    def seen(key: str):
-        def shown(row: dict) -> str:
-            found = sorted({run[key] for run in row["runs"]}, key=lambda text: (len(text), text))
-            return ", ".join(f"`{text}`" for text in found if text)
-
-        return shown
-
-    def reported(row: dict) -> str:
-        first = [run["detected"] for run in row["runs"]]
-        return spread(first) if first[0] >= 0 else "-"
-
-    return lined(
-        read_result("node_faults"),
-        {
-            "Fault": "{fault}",
-            "Expected": "`{expected}`",
-            "Measured": seen("verdicts"),
-            "Reported": reported,
-            "Counted": seen("counted"),
-            "Ticks lost": lambda row: spread([run["lost"] for run in row["runs"]]),
-            "Allowed": "{most}",
-            "Cause of the cost": "{remark}",
-        },
-    )
-
-
-def cuts() -> str:
-    return lined(
-        read_result("node_cuts"),
-        {
-            "Supply fails while": "{step}",
-            "May run then": lambda row: " or ".join(name for fate, name in FATES.items() if row["allowed"] & fate),
-            "Ran": lambda row: ", ".join(FATES[fate] for fate in sorted({run["fate"] for run in row["runs"]})),
-            "Reported": lambda row: "yes" if all(run["reported"] for run in row["runs"]) else "no",
-            "Ticks": lambda row: spread([run["ticks"] for run in row["runs"]]),
-            "Remark": "{remark}",
-        },
-    )
+    """By ticks lost: how many faults, and the worst of the six sets of parts."""
+    costs = [(max(run["lost"] for run in row["runs"]), row["most"], row["fault"]) for row in read_result("node_faults")]
+    rows = []
+    for least, most in LOST:
+        inside = [cost for cost in costs if least <= cost[0] <= most]
+        worst = max(inside)
+        rows.append(
+            [
+                f"{least}" if least == most else f"{least} to {most}",
+                str(len(inside)),
+                worst[2],
+                f"{worst[0]} of {worst[1]}",
+            ]
+        )
+    return table(["ticks lost", "faults", "the costliest", "its ticks, of those allowed"], rows)
 
 
 def storm() -> str:
@@ -144,15 +121,3 @@ def by_path() -> str:
     found = read_result("node_image")["by_path"]
     rows = [[name, str(cycles), f"{cycles / MHZ:.1f}"] for name, cycles in found.items()]
     return table(["interrupt", "cycles", "us"], rows)
-
-
-def resets() -> str:
-    return lined(
-        read_result("node_image")["resets"],
-        {
-            "cause": "{cause}",
-            "oscillator": lambda row: "kept" if row["keeps_clock"] else "reset",
-            "MHz after": lambda row: f"{row['hz'][1] / 1e6:.2f}",
-            "lost": "{lost}",
-        },
-    )
