@@ -26,7 +26,8 @@ KIDNAPS, KIDNAP_ROWS = (200, 500), 850
 CREATE = World(odometry=0.08, odometry_memory_m=0.5, run_gain=0.05, drift_rad=0.03)
 REAL = ("random_1", "random_2")  # folders of a Thymio's runs, below `thymio` of the folder of recordings
 REAL_FIRST = 100  # rows: a real run begins at one of these
-SPLICED, SPLICED_ROWS, SPLICED_M = 4, (200, 300), 0.5  # parts of a spliced run, rows of each, how far it is carried
+SPLICED, SPLICED_ROWS = 4, (200, 300)  # parts of a spliced run, rows of each
+SPLICED_M = 0.3  # twice what counts as locked: so far it is carried at least
 
 Draw = Callable[[Recipe, np.random.Generator], Recipe]
 
@@ -57,7 +58,8 @@ def room(low: float, high: float, per_m2: float = 0.4, textures=arenas.TEXTURES,
 
 def printed_floor(rng: np.random.Generator, radius: float) -> Arena:
     """Black and white cells of 2 to 4 cm, as small robots drive over."""
-    edge, cells = float(round(rng.uniform(0.02, 0.04), 3)), int(rng.integers(40, 60))
+    edge = float(round(rng.uniform(0.02, 0.04), 3))
+    cells = round(rng.uniform(1.5, 2.0) / edge)  # from each of its places another is as far off as a kidnap carries
     textures = ("BLACK", "WHITE")
     side = float(round(edge * cells, 6))
     return Arena((side, side), edge, textures, arenas.random_floor(cells, cells, textures, rng), ())
@@ -303,13 +305,13 @@ def real(folder: Path, name: str) -> Callable[[int], Made]:
 
 
 def spliced(folder: Path) -> Callable[[int], Made]:
-    """Parts of both real runs in turn: the robot is carried from the end of one to the beginning of the next."""
+    """Parts of the real runs: the robot is carried from the end of one to the beginning of the next."""
 
     def make(seed: int) -> Made:
         rng, parts, scene = np.random.default_rng(seed), [], None
         runs = [_real(folder, name) for name in REAL]
         while len(parts) < SPLICED:
-            scene, rows = runs[(len(parts) + seed) % len(runs)]
+            scene, rows = runs[rng.integers(len(runs))]
             count = int(rng.integers(*SPLICED_ROWS))
             first = int(rng.integers(len(rows) - count))
             part = stretch(rows, first, first + count)
