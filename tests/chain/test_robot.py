@@ -16,6 +16,8 @@ from quickmodels import quick_models
 
 from crunchbot import scene as scenes
 from crunchbot.bridge.ring import Reader
+from crunchbot.nav import localise
+from crunchbot.nav.observations import read_observations
 from crunchbot_lab.demo.chain import ChainRun, Link, run_chain
 from crunchbot_lab.report.run import FILTERS
 from crunchbot_lab.simulation.scenes import make_scene
@@ -28,8 +30,8 @@ def models(tmp_path_factory):
     return quick_models(tmp_path_factory.mktemp("models"), SEED)
 
 
-def fly(folder, models, create: int, seconds: float = SECONDS) -> ChainRun:
-    made = ChainRun(folder, BUILD, SEED, seconds, 6, Link(6, 30, 5), create, "bytes")
+def fly(folder, models, create: int, seconds: float = SECONDS, build: Path = BUILD) -> ChainRun:
+    made = ChainRun(folder, build, SEED, seconds, 6, Link(6, 30, 5), create, "bytes")
     scene, start = make_scene(SEED)
     scenes.write(made.scene, scene)
     (made.scene / "scene.flat").write_text(scene.flat(start))
@@ -72,6 +74,38 @@ def test_nothing_is_lost_between_netbook_and_desktop(flown):
 def test_a_create_2_flies_as_well(models, tmp_path):
     made = fly(tmp_path / "run", models, create=2, seconds=2.0)
     assert json.loads((made.out / "pilot.json").read_text())["base"]["angle_source"] == "encoders"
+
+
+def lifting(folder: Path) -> Path:
+    """The programs, but that of the bridge: there the base is lifted for 0.3 s."""
+    folder.mkdir()
+    for path in BUILD.rglob("whisker*"):
+        if path.is_file() and os.access(path, os.X_OK):
+            (folder / path.name).symlink_to(path)
+    bridge = folder / "whisker-bridge-sim"
+    lifted = " ".join(f"--create-event drop-{side}@2+0.3" for side in ("left", "right"))
+    script = f'#!/bin/sh\nexec "{bridge.readlink()}" {lifted} "$@"\n'
+    bridge.unlink()
+    bridge.write_text(script)
+    bridge.chmod(0o755)
+    return folder
+
+
+def test_a_robot_that_is_lifted_may_be_anywhere_live_and_from_its_rows(models, tmp_path):
+    made = fly(tmp_path / "run", models, 2, 3.0, lifting(tmp_path / "bin"))
+    scene, _ = make_scene(SEED)
+    rows = read_observations(made.scene / "observations.csv", scene)
+    lifted = np.flatnonzero(np.isinf(rows.odometry).all(axis=1))
+    assert 2 <= len(lifted) <= 5 and 19 <= lifted[0] <= 21
+    for name in FILTERS:
+        live = confidence(made.out / f"est_{name}.csv")
+        assert live[lifted[-1]] <= 0.3 < 0.5 <= live[lifted[0] - 1]
+        assert live == pytest.approx(localise.run(name, scene, rows).table["confidence"], abs=1e-5)
+
+
+def confidence(path: Path) -> np.ndarray:
+    with path.open(newline="") as file:
+        return np.array([float(row["confidence"]) for row in csv.DictReader(file)])
 
 
 # ---------------------------------------------------------------------------------------------------------------------

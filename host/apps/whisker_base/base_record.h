@@ -35,7 +35,7 @@ enum {
     BASE_CLIFF_FRONT_RIGHT = 1 << 7,
     BASE_CLIFF_RIGHT = 1 << 8,
     BASE_IDLE = 1 << 9,    /* wheels will not turn: the base is not in its mode, not heard, not connected, or held */
-    BASE_CARRIED = 1 << 10 /* it said what no wheel can have done: it was carried, or what it says is wrong */
+    BASE_CARRIED = 1 << 10 /* both wheels hang, or it said what no wheel can have done: carried, or a wrong frame */
 };
 
 /* How far the base is with the mode it is asked for. From every mode the way leads through passive, where nothing can

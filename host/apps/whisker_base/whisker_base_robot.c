@@ -179,7 +179,8 @@ static void whisker_base_robot_step(struct base_robot *robot)
     const uint64_t carried = robot->odometry.carried;
     const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
     const bool more = robot->odometry.carried > carried;
-    robot->on_step(robot->context, &step, base_robot_bits(robot) | (more ? BASE_CARRIED : 0u));
+    const unsigned bits = base_robot_bits(robot), lifted = CREATE_OI_DROP_LEFT | CREATE_OI_DROP_RIGHT;
+    robot->on_step(robot->context, &step, bits | (more || (bits & lifted) == lifted ? BASE_CARRIED : 0u));
     if (more) {
         whisker_base_robot_log_carried(robot);
     }

@@ -52,6 +52,16 @@ struct nav_gaussian nav_gaussian_sum_moments(const struct nav_gaussian_sum *s)
     return g;
 }
 
+void nav_gaussian_carry(struct nav_gaussian *g, const struct nav_arena *arena)
+{
+    struct nav_gaussian anywhere = nav_gaussian_uniform(arena);
+    struct nav_gaussian_sum sum = {.about = g->mean};
+    anywhere.mean.theta = g->mean.theta;
+    nav_gaussian_sum_add(&sum, 1.0 - NAV_CARRIED, g);
+    nav_gaussian_sum_add(&sum, NAV_CARRIED, &anywhere);
+    *g = nav_gaussian_sum_moments(&sum);
+}
+
 void nav_gaussian_covariance(const struct nav_gaussian *g, struct nav_pose about, double out[9])
 {
     const double off[3] = {g->mean.x - about.x, g->mean.y - about.y, nav_wrap(g->mean.theta - about.theta)};

@@ -28,6 +28,9 @@ struct nav_component;
 /* A uniform belief as a Gaussian: the arena's centre with the arena's own spread. */
 struct nav_gaussian nav_gaussian_uniform(const struct nav_arena *);
 
+/* The belief that a robot was carried: NAV_CARRIED of it uniform, by its moments. */
+void nav_gaussian_carry(struct nav_gaussian *, const struct nav_arena *);
+
 /* Pose, covariance and confidence of a Gaussian belief. */
 void nav_gaussian_estimate(const struct nav_gaussian *, struct nav_estimate *);
 

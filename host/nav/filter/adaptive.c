@@ -73,9 +73,10 @@ static double adaptive_log_odds(const struct adaptive *a)
     double hazard = log(a->problem->settings.adaptive.hazard);
     if (!a->local)
         return INFINITY;
-    if (a->awake && !a->whole && adaptive_global_current(&a->global, &a->log))
+    bool searched = a->awake && !a->whole;
+    if (searched && adaptive_global_current(&a->global, &a->log))
         return a->odds + a->global.gained;
-    return hazard + a->kidnap.ratio;
+    return (searched ? a->odds : hazard) + a->kidnap.ratio;
 }
 
 static double adaptive_kidnap_probability(const struct adaptive *a)
@@ -371,6 +372,18 @@ static void adaptive_catch_up(struct adaptive *a)
     adaptive_sum_up(a);
 }
 
+/* NAV_CARRIED of the belief is anywhere from here on: the histogram begins anew beside what is held locally. */
+static void adaptive_carry(struct adaptive *a)
+{
+    double away = 1.0 - (1.0 - adaptive_kidnap_probability(a)) * (1.0 - NAV_CARRIED);
+    if (a->gaussian.carries)
+        adaptive_scatter(a);
+    adaptive_kidnap_clear(&a->kidnap, a->likelihood, a->log.head);
+    adaptive_start_search(a);
+    a->odds = log(away) - log1p(-away);
+    adaptive_sum_up(a);
+}
+
 static void adaptive_predict(void *self, const struct nav_motion *motion)
 {
     struct adaptive *a = self;
@@ -380,6 +393,8 @@ static void adaptive_predict(void *self, const struct nav_motion *motion)
     struct nav_noise noise = nav_motion_noise(&a->problem->robot, &a->problem->settings, motion);
     nav_pending_add(&a->pending, motion->step, noise);
     a->pending_unknown = a->pending_unknown || motion->unknown_m > 0.0 || motion->unknown_rad > 0.0;
+    if (motion->carried)
+        adaptive_carry(a);
 }
 
 /* Whether a Gaussian estimates the pose as well: both take the same rows, from where the cloud is one compact mode. */

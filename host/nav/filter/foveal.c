@@ -56,6 +56,8 @@ static void foveal_predict(void *self, const struct nav_motion *motion)
     struct foveal *f = self;
     struct nav_noise noise = nav_motion_noise(&f->problem->robot, &f->problem->settings, motion);
     nav_gaussian_move(&f->belief, motion->step, &noise);
+    if (motion->carried)
+        nav_gaussian_carry(&f->belief, &f->problem->arena);
 }
 
 /* Offset of step i from the middle of an axis. */

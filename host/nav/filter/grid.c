@@ -191,6 +191,18 @@ static struct nav_motion grid_calibrated(struct grid *g, const struct nav_motion
     return g->last;
 }
 
+/* NAV_CARRIED of the belief is anywhere: what every cell then gets is added in a pass without a likelihood. */
+static void grid_carry(struct grid *g)
+{
+    const double each = NAV_CARRIED / (1.0 - NAV_CARRIED) / nav_shape_inside(&g->histogram.shape);
+    const struct nav_weigh more = {.extra = each};
+    if (!(g->histogram.total > 0.0) || g->histogram.uniform)
+        return;
+    nav_histogram_begin(&g->histogram, (struct nav_pose){0.0, 0.0, 0.0}, &more, g->mean);
+    nav_histogram_run(&g->histogram, LONG_MAX);
+    g->near *= 1.0 - NAV_CARRIED;
+}
+
 static void grid_predict(void *self, const struct nav_motion *reported)
 {
     struct grid *g = self;
@@ -200,6 +212,8 @@ static void grid_predict(void *self, const struct nav_motion *reported)
     struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, &motion);
     noise.position += nav_histogram_fan(&g->histogram, motion.step, g->problem->settings.motion.along_m);
     nav_pending_add(&g->pending, motion.step, noise);
+    if (reported->carried)
+        grid_carry(g);
 }
 
 static void grid_update(void *self, const struct nav_evidence *evidence)

@@ -66,6 +66,10 @@ static void kalman_predict(void *self, const struct nav_motion *motion)
     struct nav_kalman *k = self;
     struct nav_noise noise = nav_motion_noise(&k->problem->robot, &k->problem->settings, motion);
     nav_kalman_move(k, motion->step, &noise);
+    if (motion->carried) {
+        nav_gaussian_carry(&k->belief, &k->problem->arena);
+        nav_borders_forget(&k->borders);
+    }
 }
 
 /* Expected direction of the face that the mean meets, less the reported one, for a robot that is turned otherwise.

@@ -80,6 +80,23 @@ static void particle_catch_up(struct particle *f)
     f->moved += f->cloud.count;
 }
 
+/* NAV_CARRIED of the belief is anywhere: drawn among as many as there may be. */
+static void particle_carry(struct particle *f)
+{
+    const struct nav_prior anywhere = {.uniform = true};
+    struct nav_pose pose;
+    particle_catch_up(f);
+    nav_particles_resample(&f->cloud, f->sample.most, nav_rng_uniform(&f->rng));
+    for (long n = 0; n < f->cloud.count; n++) {
+        if (nav_rng_uniform(&f->rng) < NAV_CARRIED &&
+            nav_particles_draw(f->likelihood, &anywhere, 1.0, &f->rng, &pose))
+            nav_particles_set(&f->cloud, n, pose);
+    }
+    f->moved += f->cloud.count;
+    f->slow = f->fast = -1.0;
+    particle_summarise(f);
+}
+
 static void particle_predict(void *self, const struct nav_motion *motion)
 {
     struct particle *f = self;
@@ -91,6 +108,8 @@ static void particle_predict(void *self, const struct nav_motion *motion)
         particle_catch_up(f);
         particle_summarise(f);
     }
+    if (motion->carried)
+        particle_carry(f);
 }
 
 /* Share of fresh particles that the weights' decline asks for. */

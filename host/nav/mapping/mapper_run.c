@@ -209,6 +209,10 @@ static void mapper_go_on(struct nav_mapper *m, const struct nav_row *row)
 
 void nav_mapper_step(struct nav_mapper *m, const struct nav_row *row, struct nav_estimate *out)
 {
+    const bool carried = nav_row_carried(row);
+    if (m->lost.first < 0 && carried && m->begun)
+        m->lost = (struct nav_mapper_lost){.first = m->course.row, .noticed = m->course.row};
+    m->begun |= !carried;
     if (m->lost.first < 0)
         mapper_go_on(m, row);
     mapper_answer(m, out);

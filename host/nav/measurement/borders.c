@@ -72,6 +72,14 @@ static void borders_settle(struct nav_borders *b, int tip, int surface)
         b->score[tip * b->classes + k] = 0.0;
 }
 
+void nav_borders_forget(struct nav_borders *b)
+{
+    for (int t = 0; t < b->tips; t++) {
+        b->held[t] = 0.0;
+        borders_settle(b, t, -1);
+    }
+}
+
 static int borders_best_of(const float *loglik, int classes)
 {
     int best = 0;

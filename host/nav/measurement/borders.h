@@ -35,6 +35,9 @@ void nav_borders_free(struct nav_borders *);
 /* Follows the robot, every row. */
 void nav_borders_move(struct nav_borders *, struct nav_pose step);
 
+/* Forgets what is under the tips: the robot was carried. */
+void nav_borders_forget(struct nav_borders *);
+
 /* Takes tip number `tip`'s log-likelihoods by texture; true when they show that it has crossed. */
 bool nav_borders_read(struct nav_borders *, int tip, const float *loglik, struct nav_crossing *);
 

@@ -86,6 +86,11 @@ static enum arrival intake_arrival_of(struct nav_intake *in, const struct nav_ro
     return row->t_s < in->latest ? LATE : ON_TIME;
 }
 
+bool nav_row_carried(const struct nav_row *row)
+{
+    return isinf(row->odometry[0]) || isinf(row->odometry[1]) || isinf(row->odometry[2]);
+}
+
 static bool intake_odometry_ok(struct nav_intake *in, const double odometry[3])
 {
     uint64_t before = in->bad_cells;
@@ -99,7 +104,7 @@ static bool intake_odometry_ok(struct nav_intake *in, const double odometry[3])
 static struct nav_motion intake_take_odometry(struct nav_intake *in, const struct nav_row *row, enum arrival arrival)
 {
     struct nav_pose step = {row->odometry[0], row->odometry[1], row->odometry[2]};
-    bool known = intake_odometry_ok(in, row->odometry);
+    bool known = !nav_row_carried(row) && intake_odometry_ok(in, row->odometry);
     if (arrival == LATE && known)
         return nav_gaps_fill(&in->gaps, step, row->t_s);
     if (arrival == LATE)
@@ -126,7 +131,8 @@ static void intake_add_path(struct nav_intake *in, const struct nav_motion *moti
     double distance = hypot(motion->step.x, motion->step.y) + motion->unknown_m;
     double turn = fabs(motion->step.theta) + motion->unknown_rad;
     for (int w = 0; w < in->sensors.count; w++)
-        in->track[w].moved += distance + intake_lever(&in->sensors.model[w]) * turn;
+        in->track[w].moved +=
+            motion->carried ? (double)INFINITY : distance + intake_lever(&in->sensors.model[w]) * turn;
 }
 
 /* Takes sensor w's reading from a row; returns how much of it counts. */
@@ -166,6 +172,7 @@ bool nav_intake_take(struct nav_intake *in, const struct nav_row *row, struct na
     if (arrival == REPEATED)
         return false;
     *motion = intake_take_odometry(in, row, arrival);
+    motion->carried = nav_row_carried(row);
     intake_add_path(in, motion);
     /* The motion of a row out of order is real, but its readings belong to a pose that is gone, or that nobody knows.
      */

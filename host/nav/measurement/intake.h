@@ -29,6 +29,9 @@ struct nav_intake {
     double *weight;
 };
 
+/* Whether a row says that the robot was carried. */
+bool nav_row_carried(const struct nav_row *);
+
 int nav_intake_init(struct nav_intake *, const struct nav_problem *);
 void nav_intake_free(struct nav_intake *);
 

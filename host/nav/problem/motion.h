@@ -2,6 +2,8 @@
 #ifndef NAV_MOTION_H
 #define NAV_MOTION_H
 
+#include <stdbool.h>
+
 #include "arena.h"
 #include "pose.h"
 #include "settings.h"
@@ -11,6 +13,7 @@ struct nav_motion {
     struct nav_pose step;
     double unknown_m; /* distance and angle that may have gone unreported (rows lost, odometry not readable) */
     double unknown_rad;
+    bool carried; /* and it may have been put down anywhere: NAV_CARRIED */
 };
 
 /* Variances of one motion. Position noise is taken as equal along and across. */

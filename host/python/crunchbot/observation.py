@@ -22,7 +22,7 @@ NORMAL = ("normal_rad", "normal_sd_rad")
 POINT = ("point_x_m", "point_y_m", "point_sd_m")
 SURFACE = "surface_"  # before a texture: its log-likelihood for the face that the whisker sweeps along
 
-EXPLORING, WHISK, RELEASE = range(3)  # Row.kind
+EXPLORING, WHISK, RELEASE, CARRIED = range(4)  # Row.kind
 EMPTY, NOT_READ, VALUE = range(3)  # of a cell; an empty distance is "no contact", any other empty cell "not read"
 
 
@@ -120,7 +120,7 @@ class Row(Mapping):
 
     kind: int
     t_s: float
-    motion: np.ndarray  # (3,) since the last row, in the robot's frame before it: m, m, rad
+    motion: np.ndarray  # (3,) since the last row, in the robot's frame before it: m, m, rad; of CARRIED infinite
     names: tuple[str, ...]  # of the columns behind time and motion
     cells: np.ndarray  # (n,) uint8: EMPTY, NOT_READ or VALUE
     numbers: np.ndarray  # (n,) in the unit of the name; 0 where there is none

@@ -17,6 +17,7 @@ struct nav_mapper {
     int sought; /* borders when a lattice was sought last */
     struct nav_kidnap kidnap;
     struct nav_mapper_lost lost;
+    bool begun; /* a row has come that does not say that the robot was carried */
 };
 
 /* The likeliest hypothesis. */

@@ -178,11 +178,30 @@ static void confidence_is_the_mass_near_the_pose_of_twins(void **state)
     }
 }
 
+/* Two rows say so: a quarter of the belief stays. */
+static void a_robot_that_was_carried_may_be_anywhere(void **state)
+{
+    (void)state;
+    for (int index = 0; index < FILTERS; index++) {
+        struct tried t;
+        begin(&t, index, 13);
+        read_rows(&t, 60, "known");
+        blind_rows(&t, 2, INFINITY, 0.0, "carried");
+        assert_true(t.e.confidence < 0.35);
+        blind_rows(&t, 3, 0.05, 0.1, "carried, blind");
+        t.w.pose = (struct nav_pose){0.4, 1.7, -1.0};
+        read_rows(&t, 80, "carried, read again");
+        assert_int_equal(nav_filter_bad_cells(t.filter), 0);
+        done(&t);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(confidence_is_the_mass_near_the_pose),
         cmocka_unit_test(confidence_is_the_mass_near_the_pose_of_twins),
+        cmocka_unit_test(a_robot_that_was_carried_may_be_anywhere),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -107,15 +107,15 @@ def _times(rows: Observations) -> Iterator[str]:
 
 def _motions(rows: Observations) -> list[str]:
     """By what the base can do in the time since the row before that moved, for a whisk's motion is held back."""
-    number, moved = np.arange(len(rows)), rows.odometry.any(axis=1)
+    number, moved, carried = np.arange(len(rows)), rows.odometry.any(axis=1), np.isinf(rows.odometry).any(axis=1)
     since = np.concatenate([[-1], np.maximum.accumulate(np.where(moved, number, -1))[:-1]])
     seconds = (number - since) * ROW_S
     if _is_usual(_period(rows)):
         seconds = np.where(since < 0, seconds, np.fmax(seconds, rows.t_s - rows.t_s[since]))
-    beyond, lines = np.zeros(len(rows), bool), []
+    beyond, lines, known = np.zeros(len(rows), bool), [], np.where(carried[:, None], 0.0, rows.odometry)
     far, turned = MOST_M_S * seconds + SLACK_M, MOST_RAD_S * seconds + SLACK_RAD
     for columns, units, most in ((slice(0, 2), METRES, far), (slice(2, 3), RADIANS, turned)):
-        part = rows.odometry[:, columns]
+        part = known[:, columns]
         size, change = (np.abs(np.hypot.reduce(p, axis=1)) for p in (part, np.diff(part, axis=0)))
         beyond |= ~(size <= most)
         share = np.mean(~(size <= most))
@@ -127,10 +127,13 @@ def _motions(rows: Observations) -> list[str]:
             lines += [f"'{ODOMETRY[columns][0]}': {text}{cause}; give the motion since the row before, in m and rad"]
     if beyond.any() and not lines:
         first, most = int(beyond.argmax()), (ROW_MOST_M, ROW_MOST_M, ROW_MOST_RAD)
-        lost = ~(np.abs(rows.odometry) <= most).all(axis=1)
+        lost = ~(np.abs(known) <= most).all(axis=1)
         motion = ", ".join(f"{value:.3g}" for value in rows.odometry[first])
         text = f"moves by {motion} in {seconds[first]:.1f} s, which the base cannot; {beyond.sum()} rows are so"
         lines += [f"row {first + 1} {text}, {lost.sum()} left out: was it carried, or its odometry set anew?"]
+    if carried.any():
+        text = f"the robot was carried in {carried.sum()} rows, first row {carried.argmax() + 1}"
+        lines += [f"{text}: it may be anywhere then; give it a pose, or let it drive"]
     return lines
 
 

@@ -17,6 +17,7 @@ ANSWER_BYTES = 4096
 # Bits of an odometry message: what was true at some time since the message before it.
 BUMP_RIGHT, BUMP_LEFT, DROP_RIGHT, DROP_LEFT, DROP_CASTER = (1 << n for n in range(5))
 CLIFF_LEFT, CLIFF_FRONT_LEFT, CLIFF_FRONT_RIGHT, CLIFF_RIGHT = (1 << n for n in range(5, 9))
+CARRIED = 1 << 10  # what no wheel can have done: it was lifted, pushed, or the line is bad
 IDLE = 1 << 9  # wheels will not turn: not in its mode, silent, held (see `health()`), or the port is gone
 
 

@@ -1,11 +1,12 @@
 """The netbook's part: samples and odometry in, wheel speeds and observation rows out. Knows no device and no world.
 
-The row of every 0.1 s is one of four kinds:
+The row of every 0.1 s is one of five kinds:
     exploring         odometry, texture of the last 200 samples while the tips sweep at the trained speed, radial cells
                       empty (read, no contact) or nan (touching: no measured distance)
     body whisk        zero odometry, texture empty, radial cells nan
     release in it     odometry since the last row that carried any, and the distance of each whisker measured
     first after it    odometry since the release
+    carried           the base says that it may be anywhere: odometry infinite, nothing read
 
 Where an object whisker's model is one of whole whisks, a row that carries motion also reports the direction of the surface that is
 touched or was just let go, and where. Where it has a texture model, rows carry the texture of the face that its tip swept
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from .. import observation
-from ..observation import EXPLORING, NORMAL, POINT, RELEASE, WHISK, Layout, Quantity, Row
+from ..observation import CARRIED, EXPLORING, NORMAL, POINT, RELEASE, WHISK, Layout, Quantity, Row
 from ..touch.contact import Contact
 from ..touch.floor import WINDOW_LEAST_GOOD, WINDOW_SAMPLES, floor_whisker
 from ..touch.mount import Mount
@@ -122,6 +123,8 @@ class Pilot:
     def odometry(self, tick: int, dx: float, dy: float, dtheta: float, bumps: Bumps = NO_BUMPS) -> Row:
         """The observation row of the 0.1 s that end at `tick`; motion in the robot frame at their start."""
         self.behaviour.moved(tick, dx, dy, dtheta, bumps)
+        if bumps.carried:
+            return self._carried(tick)
         self._pending = compose(self._pending, (dx, dy, dtheta))
         whisking = self.behaviour.whisking
         released = {n: m for n, m in self._measured.items() if m[0] <= tick}
@@ -143,6 +146,16 @@ class Pilot:
         measured = any(math.isfinite(distance) for _, distance in released.values())
         kind = RELEASE if measured else WHISK if whisking else EXPLORING
         return Row.made(kind, round((tick + 1) * TICK_S, 4), moved, self.layout.names, cells)
+
+    def _carried(self, tick: int) -> Row:
+        """The row of a robot that may be anywhere; what was felt and moved before says nothing of there."""
+        self._pending = np.zeros(3)
+        self._measured.clear()
+        for lane in self.texture_lanes:
+            self._texture_cells(lane, tick, held_back=True)
+        distances = self.layout.of(Quantity.DISTANCE)
+        nothing = [math.nan if name in distances else None for name in self.layout.names]
+        return Row.made(CARRIED, round((tick + 1) * TICK_S, 4), [math.inf] * 3, self.layout.names, nothing)
 
     def _follow_whisk(self, ticks, samples, good) -> None:
         """Gather the whisk's samples; once a whisker that was pushed long enough lets go, its distance is known."""

@@ -34,13 +34,14 @@ EXACT = Wheels()  # any speed, as the simulated wheels without a base have it
 
 @dataclass(frozen=True)
 class Bumps:
-    """What the base feels besides its wheels' motion; `lost`: nothing is heard from it."""
+    """What the base feels besides its wheels' motion; `carried`: it may be anywhere, `lost`: nothing is heard from it."""
 
     left: bool = False
     right: bool = False
     cliff_left: bool = False
     cliff_right: bool = False
     wheel_drop: bool = False
+    carried: bool = False
     lost: bool = False
 
     @classmethod
@@ -52,6 +53,7 @@ class Bumps:
             cliff_left=bool(bits & (base.CLIFF_LEFT | base.CLIFF_FRONT_LEFT)),
             cliff_right=bool(bits & (base.CLIFF_RIGHT | base.CLIFF_FRONT_RIGHT)),
             wheel_drop=bool(bits & (base.DROP_LEFT | base.DROP_RIGHT | base.DROP_CASTER)),
+            carried=bool(bits & base.CARRIED),
             lost=bool(bits & base.IDLE),
         )
 

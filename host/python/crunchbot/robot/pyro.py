@@ -127,8 +127,8 @@ class Results:
             raise ValueError("row: not cells by name; give a dict")
         checked = {str(name): _number(name, value) for name, value in row.items()}
         for name in ("t_s", *ODOMETRY):
-            if checked.get(name) is None or not math.isfinite(checked[name]):
-                raise ValueError(f"{name}: missing or not finite; give every row its time and motion")
+            if checked.get(name) is None or math.isnan(checked[name]):
+                raise ValueError(f"{name}: missing or no number; give every row its time and motion")
         if not 0.0 <= checked["t_s"] <= TIME.high:
             raise ValueError(
                 f"t_s: {checked['t_s']:.6g} is not within 0 and {TIME.high:.6g}; give seconds since the start"

@@ -56,6 +56,15 @@ def test_a_scene_with_broken_cells_is_mapped_and_they_are_reported(tmp_path, cap
     assert json.loads(capsys.readouterr().out)["bad_cells"] == cells
 
 
+def test_where_the_robot_was_carried_a_new_map_begins():
+    rows = make("anchor", 33, ROWS).observations
+    motion = rows.odometry.copy()
+    motion[[0, 200, 201, 400]] = np.inf
+    made = run(make("anchor", 33, ROWS), replace(rows, odometry=motion))
+    assert [(part.first, part.noticed) for part in made.parts[1:]] == [(200, 200), (400, 400)]
+    assert made.bad_cells == 0 and np.isfinite(made.table["pose"]).all()
+
+
 def test_rows_that_never_came_make_it_less_sure():
     made = make("anchor", 34, ROWS)
     rows, kept = made.observations, np.r_[0:300, 360:ROWS]

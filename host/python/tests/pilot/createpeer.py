@@ -17,6 +17,7 @@ from crunchbot.programs import program
 
 START, SAFE, FULL, DRIVE, STREAM, PAUSE = 128, 131, 132, 145, 148, 150
 PASSIVE_MODE, SAFE_MODE, FULL_MODE = 1, 2, 3
+MODES = {START: PASSIVE_MODE, SAFE: SAFE_MODE, FULL: FULL_MODE}
 STOP = bytes([DRIVE, 0, 0, 0, 0])
 FIRM_STOP = bytes(32) + STOP  # of a guard, or of a driver that starts
 SIZES = {7: 1, 9: 1, 10: 1, 11: 1, 12: 1, 19: 2, 20: 2, 22: 2, 25: 2, 26: 2, 34: 1, 35: 1, 41: 2, 42: 2, 43: 2, 44: 2}
@@ -28,7 +29,11 @@ def drive_order(left_mm_s: int, right_mm_s: int) -> bytes:
 
 
 class Peer:
-    """A pseudo terminal whose slave is linked at `link`; keeps what the driver has written, and says what it was asked for."""
+    """A pseudo terminal whose slave is linked at `link`; keeps what the driver has written, and says what it was asked for.
+
+    A driver that has waited for too long asks anew, by way of passive: from then on frames are those, in the mode that was
+    ordered last. Before that tests say in which mode it is.
+    """
 
     PERIOD_S = 0.015
 
@@ -42,6 +47,7 @@ class Peer:
         self.heard = b""
         self.reported = 0  # bytes written to the driver
         self._orders, self._requested = b"", (0, 0)  # heard and not yet read; speeds right and left
+        self._requests, self._mode = 0, SAFE_MODE
         self.master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         self.link.symlink_to(os.ttyname(self._slave))
@@ -100,6 +106,11 @@ class Peer:
                 return
             if order == DRIVE:
                 self._requested = struct.unpack(">hh", self._orders[1:5])
+            elif order == STREAM:
+                self._requests += 1
+                self.asked = list(self._orders[2:length])
+            elif self._requests > 0:
+                self._mode = MODES.get(order, self._mode)
             self._orders = self._orders[length:]
 
     def await_order(self, order: bytes) -> bytes:
@@ -135,7 +146,7 @@ class Peer:
         """A frame of what was asked for; p35=2: packet 35 is 2. The rest is a healthy base that stands."""
         self._listen()
         requested = dict(zip((41, 42), self._requested, strict=True))
-        value = {**HEALTHY, **requested, **{int(name[1:]): number for name, number in values.items()}}
+        value = {**HEALTHY, 35: self._mode, **requested, **{int(name[1:]): number for name, number in values.items()}}
         data = b"".join(
             bytes([packet]) + (value.get(packet, 0) & (256 ** SIZES[packet] - 1)).to_bytes(SIZES[packet], "big")
             for packet in self.asked

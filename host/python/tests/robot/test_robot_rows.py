@@ -135,6 +135,18 @@ def test_the_newest_row_counts_and_a_measured_distance_too():
     assert [step.row.seq for step in Follower().take(rows, 3)] == [3, 7, 8, 9]
 
 
+def test_a_robot_that_was_carried_is_a_row_of_its_own():
+    moved = motions(10)
+    moved[6] |= dict.fromkeys(("odo_x_m", "odo_y_m", "odo_theta_rad"), math.inf)
+    rows = [m.decode(m.Observation, m.encode(row)) for row in messages_of(moved)]
+    assert [row.kind == o.CARRIED for row in rows] == [n == 6 for n in range(10)]
+    assert np.isfinite([row.pose for row in rows]).all()
+    steps = Follower().take(received(rows), 1)
+    assert [step.row.seq for step in steps] == [6, 9]
+    assert np.isinf(steps[0].last().motion).all() and np.isfinite(steps[1].last().motion).all()
+    assert all(np.isfinite(row.motion).all() for row in steps[0].lead())
+
+
 def test_a_pilot_that_begins_anew_loses_no_motion_that_was_reported():
     first, then = messages_of(motions(10)), messages_of(motions(7, seed=9))
     follower = Follower()

@@ -84,7 +84,7 @@ _TABLE = {
     "whisker_msgs/msg/Observation": {
         "header": INNER,
         "seq": up_to(ROWS_MOST),
-        "kind": up_to(2),
+        "kind": up_to(3),
         "motion": Range(tuple(-most for most in ROW), ROW),
         "pose": Range(tuple(-most for most in PLACE), PLACE),
         "names": up_to(NAME_MOST, count=CELLS_MOST),

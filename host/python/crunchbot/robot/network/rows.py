@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...observation import NOT_READ, RELEASE, Row, cell
+from ...observation import CARRIED, NOT_READ, RELEASE, Row, cell
 from ...pilot.pilot import compose
 from .inbox import Received
 from .link import Link
@@ -62,10 +62,12 @@ class RowPublisher:
 
 def to_message(row: Row, seq: int, pose: Sequence[float]) -> Observation:
     """The Observation of a row; `pose`: summed motion of those before."""
-    motion = np.array([float(cell(value)) for value in row.motion])
+    carried = np.isinf(row.motion).any()
+    motion = np.zeros(3) if carried else np.array([float(cell(value)) for value in row.motion])
     values = [float(cell(value)) for value in row.numbers]
     header = Header.at(round(row.t_s * 1e9), BASE_FRAME)
-    return Observation(header, seq, row.kind, motion, compose(pose, motion), list(row.names), row.cells, values)
+    kind = CARRIED if carried else row.kind
+    return Observation(header, seq, kind, motion, compose(pose, motion), list(row.names), row.cells, values)
 
 
 def to_row(message: Observation, motion: ArrayLike | None = None, t_ns: int | None = None) -> Row:
@@ -89,7 +91,8 @@ class Step:
 
     def last(self) -> Row:
         """The row itself, with what `lead` leaves of the motion."""
-        return to_row(self.row, self._piece(self._count), self.t_ns)
+        carried = self.row.kind == CARRIED
+        return to_row(self.row, [math.inf] * 3 if carried else self._piece(self._count), self.t_ns)
 
     def lead(self) -> list[Row]:
         """Rows to be taken before, nothing read in them: the motion of many rows, in as many.
@@ -136,7 +139,7 @@ class Follower:
     """Turns what came since the last look into steps, so that no motion is lost whatever was skipped or missed.
 
     A step for each of the newest rows, as many as there is time for (the paper: one), and one for each row before them
-    that carries a whisk's distance, because those are few. A pilot that began anew reports motion from its own
+    that carries a whisk's distance, or says that the robot was carried, because those are few. A pilot that began anew reports motion from its own
     start only: what the robot moved in between is not known.
     """
 
@@ -204,6 +207,6 @@ class Follower:
 
 
 def _is_kept(rows: list[Received], n: int) -> bool:
-    """The last of a stream that another follows, and those with a measured distance."""
+    """The last of a stream that another follows, those with a measured distance, and where the robot was carried."""
     last_of_stream = n + 1 < len(rows) and rows[n + 1].envelope.stream != rows[n].envelope.stream
-    return last_of_stream or rows[n].message.kind == RELEASE
+    return last_of_stream or rows[n].message.kind in (RELEASE, CARRIED)
