@@ -88,8 +88,7 @@ static void particle_carry(struct particle *f)
     particle_catch_up(f);
     nav_particles_resample(&f->cloud, f->sample.most, nav_rng_uniform(&f->rng));
     for (long n = 0; n < f->cloud.count; n++) {
-        if (nav_rng_uniform(&f->rng) < NAV_CARRIED &&
-            nav_particles_draw(f->likelihood, &anywhere, 1.0, &f->rng, &pose))
+        if (nav_rng_uniform(&f->rng) < NAV_CARRIED && nav_particles_draw(f->likelihood, &anywhere, 1.0, &f->rng, &pose))
             nav_particles_set(&f->cloud, n, pose);
     }
     f->moved += f->cloud.count;

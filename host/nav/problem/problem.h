@@ -49,8 +49,8 @@ struct nav_problem {
  * of the user's own was not read. */
 struct nav_row {
     double t_s;
-    double odometry[3];     /* motion since the previous row in its frame: x, y m, theta rad; infinite: it was carried */
-    const double *texture;  /* [tips][classes] log-likelihood of the window */
+    double odometry[3];    /* motion since the previous row in its frame: x, y m, theta rad; infinite: it was carried */
+    const double *texture; /* [tips][classes] log-likelihood of the window */
     const double *radial_m; /* [rays] distance of contact; INFINITY: read, no contact */
     const double *normal;   /* [rays][2] of the surface that is touched, with `normals` of the robot: direction of the
                                outward normal, robot's frame, -2 pi to 2 pi, and its standard deviation, above 0 up to
@@ -84,8 +84,8 @@ const char *nav_prior_fault(const struct nav_arena *, const struct nav_prior *, 
  * it. */
 #define NAV_ANYWHERE 0.01
 
-/* The share that is anywhere after a row says that the robot was carried. Its base says so of hands and of frames that a
- * bad line has altered, and nobody has counted which is more frequent. */
+/* The share that is anywhere after a row says that the robot was carried. Its base says so of hands and of frames that
+ * a bad line has altered, and nobody has counted which is more frequent. */
 #define NAV_CARRIED 0.5
 
 #pragma GCC visibility pop
