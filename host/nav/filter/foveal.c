@@ -1,8 +1,7 @@
 /* The paper's foveal grid: a Gaussian belief, weighted on a small grid around its mode at each reading (eqs. 5-7).
  *
- * Equation 7 is weighted by the posterior here: as printed its sum does not depend on the readings at all. Equation 6 is
- * as printed: the mean becomes the mode of the grid, so a correction is a whole step of it, or none. That is the limit
- * of the method; the posterior's mean is nearer (docs/results/nav.md). */
+ * Equation 7 is weighted by the posterior: as printed its sum does not depend on the readings. By equation 6 the mean is
+ * the grid's mode, so a correction is a whole step or none: the method's limit (docs/results/nav.md). */
 #include <math.h>
 #include <stdlib.h>
 

@@ -19,10 +19,8 @@ WHAT = {
     "and each row of readings multiplies (the paper's eq. 4).",
     "adaptive": "The default: one Gaussian while that says all, particles while the belief has a shape, a histogram of the whole "
     "arena while the robot may be anywhere; it passes from one to another by itself.",
-    "foveal": "The paper's filter: a grid of 11 by 11 by 11 poses about the estimate, fused into one Gaussian after each row "
-    "(eqs. 5-7). It takes the likeliest of these poses, 2.5 cm and 9 degrees apart, as its mean: half a step cannot be "
-    "expressed, so a run may be worse than the wheels alone, by chance; an estimate that has left the grid's reach may "
-    "never come back.",
+    "foveal": "The paper's filter: 11 by 11 by 11 poses about the estimate, fused into one Gaussian after each row (eqs. 5-7). Its "
+    "mean is one of these, 2.5 cm and 9 degrees apart: by chance worse than the wheels alone, and it may never come back.",
     "odometry": "No whisker at all: adds up what the wheels report, from the wrong start; what the others must beat.",
 }
 
