@@ -1,7 +1,7 @@
 /* The paper's foveal grid: a Gaussian belief, weighted on a small grid around its mode at each reading (eqs. 5-7).
  *
- * Equation 7 is weighted by the posterior: as printed its sum does not depend on the readings. By equation 6 the mean is
- * the grid's mode, so a correction is a whole step or none: the method's limit (docs/results/nav.md). */
+ * Equation 7 is weighted by the posterior: as printed its sum does not depend on the readings. By equation 6 the mean
+ * is the grid's mode, so a correction is a whole step or none: the method's limit (docs/results/nav.md). */
 #include <math.h>
 #include <stdlib.h>
 
