@@ -13,6 +13,10 @@ PAGES = [
         ["git", "-C", ROOT, "ls-files", "*.md"], capture_output=True, text=True, check=True
     ).stdout.split()
 ]
+TRACKED = subprocess.run(["git", "-C", ROOT, "ls-files"], capture_output=True, text=True, check=True).stdout.split()
+FOLDERS = {path.partition("/")[0] for path in TRACKED if "/" in path}
+SOURCE = re.compile(r"[\w./*\[\]-]+\.(?:c|h|cpp|py|v|vh|js|mjs|rs|sh|md|pml|ld)")
+MADE = {"drive.py", "OUT.v"}  # files that a page has the user make
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 TOUR = ROOT / "docs/code_tour.md"
 
@@ -39,6 +43,45 @@ def test_links_reach_what_they_name(page):
         if not target.exists() or (anchor and target.suffix == ".md" and anchor not in anchors(target)):
             lost.append(link)
     assert lost == []
+
+
+def spans(page: Path) -> list[str]:
+    """What stands in back quotes in the running text of a page."""
+    return re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL))
+
+
+def is_there(span: str, page: Path) -> bool:
+    """Whether what a code span names is in the tree, if it names a file or folder of it: a path from the root or from the
+    page's folder; of a source file the end of a path is enough."""
+    path = span.removeprefix("./").rstrip("/")
+    if "NAME" in path or path in MADE:
+        return True
+    if path.partition("/")[0] in FOLDERS and "/" in span and re.fullmatch(r"[\w./*\[\]-]+", path):
+        return any(list(place.glob(path)) for place in (ROOT, page.parent))
+    if SOURCE.fullmatch(path):
+        end = re.compile("(?:^|/)" + re.escape(path).replace(r"\*", "[^/]*").replace(r"\[ch\]", "[ch]") + "$")
+        return any(end.search(file) for file in TRACKED)
+    return True
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_code_spans_name_files_that_are_there(page):
+    assert [span for span in spans(page) if not is_there(span, page)] == []
+
+
+def test_a_code_span_that_names_no_file_is_found():
+    there = (
+        "host/nav/filter",
+        "filter.c",
+        "nav/filter/filter.c",
+        "core/service.[ch]",
+        "tests/",
+        "robot/topic",
+        "a.json",
+    )
+    assert [span for span in there if not is_there(span, ROOT / "README.md")] == []
+    gone = ("host/nav/gone", "gone.c", "whisker/pilot/rules.py", "docs/gone.md", "tests/gone/")
+    assert [span for span in gone if is_there(span, ROOT / "README.md")] == []
 
 
 def test_every_page_stands_on_a_shelf():

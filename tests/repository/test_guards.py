@@ -221,10 +221,28 @@ struct ring *ring_take(void)
 
 
 def test_long_lines_are_found_outside_tables_and_code(tmp_path):
-    long = "word " * 30
+    long = "Word. " * 25
     text = f"{long}\n\n| {long} |\n\n```\n{long}\n```\n"
     assert pages.complaints(repository(tmp_path, {"page.md": text})) == [
         "page.md:1: 150 characters, 120 at most; break the line"
+    ]
+
+
+def test_what_a_reader_must_get_through_is_measured(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "LINES", 7)
+    monkeypatch.setattr(pages, "NOTES", 1)
+    text = "# Head\n\n- One two three. Four `a b c`\n  five.\n- Six.\n"
+    assert pages.sentences(text) == [3, 3, 1]
+    assert pages.sentences("| a b c |\n\n```\na b\n```\n\nSee [the page](x.md). **Bold** is 3.5 m.") == [3, 4]
+    place = repository(tmp_path, {"a/README.md": text, "b/README.md": f"{'w ' * 36}.\n"})
+    assert pages.complaints(place) == ["pages: 2 notes of folders, 1 at most; only a folder with rules has one"] + [
+        "pages: 25.0 % of the sentences have more than 35 words, 2 % at most"
+    ]
+    place = repository(tmp_path, {"c.md": f"{'w ' * 35}\n" * 4})
+    assert [line.split(",")[0] for line in pages.complaints(place)][:3] == [
+        "pages: 10 lines of Markdown",
+        "pages: 2 notes of folders",
+        "pages: 36.6 words a sentence",
     ]
 
 

@@ -1,4 +1,4 @@
-"""Certificates of an authority made for a test, and the configuration of zenoh that docs/remote.md gives for them."""
+"""Certificates of an authority made for a test, and the configuration of zenoh that docs/zenoh.json5 gives for them."""
 
 import subprocess
 from pathlib import Path
@@ -23,10 +23,8 @@ def certificates(folder: Path, *names: str) -> None:
 
 
 def documented(folder: Path, name: str) -> Path:
-    """The configuration of docs/remote.md with this folder's certificates in place of those it names."""
-    text = (Path(__file__).parents[4] / "docs/remote.md").read_text()
-    example = text.partition("```json5\n")[2].partition("```")[0]
-    assert "access_control" in example
+    """The configuration of docs/zenoh.json5 with this folder's certificates in place of those it names."""
+    example = (Path(__file__).parents[4] / "docs/zenoh.json5").read_text()
     file = folder / f"{name}.json5"
     file.write_text(example.replace("/etc/whisker/own", str(folder / name)).replace("/etc/whisker", str(folder)))
     return file
