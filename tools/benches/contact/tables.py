@@ -52,15 +52,3 @@ def speeds(case: str) -> str:
             "held 90 %": "{speed_held_90:100*.0f} %",
         },
     )
-
-
-def slips(case: str) -> str:
-    return lined(
-        [one for one in kinds(case) if "slip_right" in one],
-        {
-            "contact": "{kind}",
-            "sticks": "{sticks:100*.0f} %",
-            "stick or slip right": "{slip_right:100*.0f} %",
-            "expected calibration error": "{slip_ece:.3f}",
-        },
-    )

@@ -39,21 +39,22 @@ def stability() -> str:
 
 
 def families() -> str:
-    """The default filter on every family, and on all of each group."""
-    return lined(named(read_result("nav_families")["families"], "family"), {"family": "{family}"} | FIGURES)
+    """The default filter on all families of each group, and on all."""
+    rows = named(read_result("nav_families")["families"], "family")
+    return lined([row for row in rows if row["family"].startswith("all")], {"families": "{family}"} | FIGURES)
 
 
 WANTED_MM = {"anchor": 20, "robot": 35, "raw": 45, "noisy": 80}
 
 
-def maps(part: str) -> str:
-    """Families of a part of the result."""
+def maps(*parts: str) -> str:
+    """Families of these parts of the result."""
 
     def name(row: dict) -> str:
         return row["family"] if row["rows"] == 3000 else f"{row['family']}, {row['rows'] / 600:.0f} min"
 
     return lined(
-        named(read_result("map")[part], "family"),
+        [row for part in parts for row in named(read_result("map")[part], "family")],
         {
             "family": name,
             "runs": "{runs}",

@@ -2,7 +2,6 @@
 
 from ..store import read_result
 from ..tables import lined, named, table
-from .image import HANDLERS
 
 LOST = ((0, 0), (1, 1), (2, 2), (3, 10), (11, 50), (51, 300))  # groups of ticks
 MHZ = 38.6925  # instructions a microsecond
@@ -106,15 +105,6 @@ def image_sums() -> str:
             ["reset to the main loop, image check included: at most, cycles", f"{found['boot_cycles']:,}"],
         ],
     )
-
-
-def interrupts() -> str:
-    rows = []
-    for name, (irq, what) in HANDLERS.items():
-        h = read_result("node_image")["handlers"][name]
-        cells = (irq, what, h["acts"] or "-", f"{h['least']} to {h['most']}", h["stack"], f"{h['count']:,}")
-        rows.append(list(map(str, cells)))
-    return table(["interrupt", "what it does", "acts, at most", "whole", "stack", "seen"], rows)
 
 
 def by_path() -> str:

@@ -75,19 +75,3 @@ def borders() -> str:
             "held: wrong": "{wrong_while_held:100*.1f}",
         },
     )
-
-
-def peers() -> str:
-    found = read_result("texture")
-    return lined(
-        named({"BorealTC": found["borealtc"], "Vulpi": found["vulpi"]}, "recordings", "method"),
-        {
-            "recordings": "{recordings}",
-            "method": "{method}",
-            "right": "{accuracy:100*.1f}",
-            "unknown": "{refused:100*.1f}",
-            "error": "{calibration_error:100*.1f}",
-            "cut": "{cut_at_a_tenth_refused:.1f}",
-            "area": "{area_under_risk_coverage:100*.2f}",
-        },
-    )
