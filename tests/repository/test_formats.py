@@ -20,7 +20,7 @@ from crunchbot.bridge import nodes, ring
 from crunchbot.commands import info, radial, stream, texture
 from crunchbot.nav import localise, observations
 from crunchbot.observation import NORMAL, POINT, SURFACE
-from crunchbot.robot import checkpoint, rowfiles, track
+from crunchbot.robot import rowfiles, track
 from crunchbot.sensor_tables import SensorTable
 from crunchbot.touch import calibration
 from crunchbot.touch.radial import model as radial_models
@@ -29,9 +29,6 @@ from crunchbot.touch.radial.curve import CurveModel
 from crunchbot.touch.radial.whisk import WhiskModel
 from crunchbot.touch.texture import model as texture_model
 from crunchbot.touch.texture import spectral
-from crunchbot.touch.texture.change import Change
-from crunchbot.touch.texture.classifier import Classifier
-from crunchbot.touch.texture.novelty import Novelty
 from crunchbot_lab import scenes
 from crunchbot_lab.demo import level1, training
 from crunchbot_lab.scenes import thymio
@@ -208,13 +205,6 @@ def test_fields_of_texture_models():
     assert column("Texture models") == fields | {"format"}
     assert row_of("Texture models", "format") == {spectral.FORMAT}
     assert row_of("Texture models", "limits") - {"[C]"} == set(spectral.LIMITS)
-    parts: dict[str, set[str]] = {}
-    part = ""
-    for row in tables("Texture models")[1][1:]:
-        part = (names(row[:1]) or {part}).pop()
-        parts.setdefault(part, set()).update(names([row[1]]))
-    for name, kind in (("classifiers", Classifier), ("change", Change), ("novelty", Novelty)):
-        assert parts[name] == {*kind.NUMBERS, *kind.ARRAYS, *({"span"} if kind is Classifier else ())}
     naive = re.search(r"The naive Bayes.*?\n\n", PAGE, re.DOTALL)[0]
     saved = set(re.findall(r'"(\w+)"', inspect.getsource(texture_model.TextureModel.save)))
     assert names([naive]) >= saved | {texture_model.FORMAT}
@@ -262,11 +252,6 @@ def test_lines_of_a_list_of_nodes(tmp_path):
     path = tmp_path / "nodes.txt"
     path.write_text("  2    7  1.0 mlx90333\nlane 3: serial 8, more\n  4 none  1.0 x\nlane 3: serial 9, later\n")
     assert nodes.read_nodes(path) == {2: 7, 3: 9}
-
-
-def test_fields_of_a_checkpoint():
-    assert column("Checkpoint of a navigator") == checkpoint.FIELDS
-    assert f"`{checkpoint.MAGIC.decode()}`" in PAGE
 
 
 def test_keys_of_localise(folder):

@@ -1,4 +1,4 @@
-"""Tables of docs/results/simulation.md, of the demo's page and of docs/boards.md."""
+"""Tables of docs/results/robot.md, host.md, docs/record.md and docs/boards.md."""
 
 from ..store import read_result
 from ..tables import lined, table

@@ -1,4 +1,4 @@
-"""Tables of docs/results/node_faults.md and node_image.md."""
+"""Tables of docs/results/node_faults.md."""
 
 from ..store import read_result
 from ..tables import lined, named, table
