@@ -117,6 +117,15 @@ static void sim_create_report_charge(sim_create *create)
     }
 }
 
+void sim_create_pin(sim_create *create, bool low)
+{
+    if (low && !create->pin_low) {
+        create->asleep = false;
+        create->heard_at = create->ticks;
+    }
+    create->pin_low = low;
+}
+
 /* A robot that rests and hears nothing for so long switches itself off; it answers nothing until it is woken. */
 static void sim_create_sleep(sim_create *create)
 {

@@ -113,6 +113,9 @@ void sim_create_free(sim_create *create);
  * a queue as many as fill it up to SIM_CREATE_IN_MAX. */
 size_t sim_create_receive(sim_create *create, const uint8_t *bytes, size_t count);
 
+/* The BRC pin: going low wakes it, and begins the five minutes to its sleep anew. */
+void sim_create_pin(sim_create *create, bool low);
+
 /* The host's adapter throws away what has not left it, and says how much that is. */
 void sim_create_flush(sim_create *create);
 size_t sim_create_queued(const sim_create *create);

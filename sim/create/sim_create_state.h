@@ -70,6 +70,7 @@ struct sim_create {
     double charge_mah;
     uint64_t heard_at; /* tick of the newest byte from the host */
     bool asleep;
+    bool pin_low; /* BRC */
     struct create_reader reader;
     struct create_wheels wheels;
     struct create_line line;

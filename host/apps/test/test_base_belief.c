@@ -1,12 +1,11 @@
 /* What of a base is believed, and when: nothing that it did not say in the last half second, after it was asked. */
-#include "base_rig.h"
+#include "base_met.h"
 
 #include <math.h>
 
 #define OPENED_MS 1000
 #define FRAME_MS CREATE_OI_PERIOD_MS
 
-static int commander, other;
 static struct create_motion motion;
 static uint8_t orders[4096]; /* written since the last look */
 static size_t order_count;
@@ -17,19 +16,13 @@ static void on_step(void *context, const struct create_step *step, unsigned bits
     create_motion_add(&motion, step);
 }
 
-static void meet(void)
-{
-    motion = (struct create_motion){0};
-    assert_true(base_clients_add(&clients, pair(SOCK_SEQPACKET, &commander), OPENED_MS));
-    assert_true(base_clients_add(&clients, pair(SOCK_SEQPACKET, &other), OPENED_MS));
-}
-
 /* Opened, and not heard yet. */
 static int begin_unheard(void **state)
 {
     (void)state;
     open_rig(false, on_step, OPENED_MS);
-    meet();
+    motion = (struct create_motion){0};
+    meet(OPENED_MS);
     return 0;
 }
 
@@ -38,16 +31,8 @@ static int begin(void **state)
 {
     (void)state;
     begin_rig(false, on_step, OPENED_MS);
-    meet();
-    return 0;
-}
-
-static int end(void **state)
-{
-    (void)state;
-    end_rig();
-    close(commander);
-    close(other);
+    motion = (struct create_motion){0};
+    meet(OPENED_MS);
     return 0;
 }
 
@@ -190,14 +175,21 @@ static void a_mode_is_asked_for_until_the_base_says_it(void **state)
     assert_false(base_robot_kept(&robot));
 }
 
-/* The order `safe` after `full` is lost: the base is in full mode, and says so. */
-static void a_base_that_did_not_hear_of_a_lower_mode_does_not_drive(void **state)
+/* When the base says that it is in full mode. */
+static int64_t enter_full(void)
 {
-    (void)state;
     int64_t now_ms = OPENED_MS + 200;
     say(commander, "mode full", now_ms);
     report(CREATE_OI_MODE_PASSIVE, 0, 0, now_ms += FRAME_MS);
     report(CREATE_OI_MODE_FULL, 0, 0, now_ms += FRAME_MS);
+    return now_ms;
+}
+
+/* The order `safe` after `full` is lost: the base is in full mode, and says so. */
+static void a_base_that_did_not_hear_of_a_lower_mode_does_not_drive(void **state)
+{
+    (void)state;
+    int64_t now_ms = enter_full();
     assert_non_null(strstr(health(now_ms), " mode=full "));
     say(commander, "mode safe", now_ms += 200);
     for (int i = 0; i < 200; i++) { /* it hears the request, and not what stands before it */
@@ -211,10 +203,7 @@ static void a_base_that_did_not_hear_of_a_lower_mode_does_not_drive(void **state
 static void a_mode_ends_with_who_asked_for_it(void **state)
 {
     (void)state;
-    int64_t now_ms = OPENED_MS + 200;
-    say(commander, "mode full", now_ms);
-    report(CREATE_OI_MODE_PASSIVE, 0, 0, now_ms += FRAME_MS);
-    report(CREATE_OI_MODE_FULL, 0, 0, now_ms += FRAME_MS);
+    int64_t now_ms = enter_full();
     say(other, "drive 0 0", now_ms + BASE_PLACE_MS); /* it has ordered nothing for so long: another takes the command */
     assert_int_equal(robot.wanted, CREATE_OI_MODE_SAFE);
     assert_true(base_robot_kept(&robot));

@@ -1,5 +1,5 @@
 /* Orders of clients while the base is silent: how far it has driven meanwhile, when it is heard again. */
-#include "base_rig.h"
+#include "base_met.h"
 
 #include <math.h>
 
@@ -12,7 +12,6 @@
 #define ORDERED_MS (HEARD_MS + 200)
 #define BACK_MS (HEARD_MS + 1500)
 
-static int commander, other; /* the far ends */
 static double driven_m;
 
 static void on_step(void *context, const struct create_step *step, unsigned bits)
@@ -26,22 +25,12 @@ static int begin(void **state)
 {
     (void)state;
     begin_rig(false, on_step, OPENED_MS);
-    assert_true(base_clients_add(&clients, pair(SOCK_SEQPACKET, &commander), OPENED_MS));
-    assert_true(base_clients_add(&clients, pair(SOCK_SEQPACKET, &other), OPENED_MS));
+    meet(OPENED_MS);
     say(commander, "drive 0.2 0", OPENED_MS);
     for (int64_t now_ms = OPENED_MS; now_ms < HEARD_MS; now_ms += CREATE_OI_PERIOD_MS) {
         report_frame(SPEED_MM_S, FRAME_MM, now_ms + CREATE_OI_PERIOD_MS);
     }
     driven_m = 0;
-    return 0;
-}
-
-static int end(void **state)
-{
-    (void)state;
-    end_rig();
-    close(commander);
-    close(other);
     return 0;
 }
 

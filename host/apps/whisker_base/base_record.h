@@ -15,6 +15,10 @@
 #define BASE_COMMANDER_MS 300
 #define BASE_SILENCE_MS 450
 #define BASE_REOPEN_MS 50
+/* A base that rests sleeps after five minutes, unless its BRC pin is low for a moment before; and wakes by that. The
+ * manual of the Create 2 has it low for a second of each minute, which does not change the speed of the line. */
+#define BASE_PULSE_MS 60000
+#define BASE_LOW_MS 1000
 /* A base that stays silent is reported so often. */
 #define BASE_TELL_MS 3600000
 /* Between two orders to the wheels, but for a stop: the line is never behind by more than one. */
@@ -103,9 +107,10 @@ struct base_robot {
     int64_t ordered_ms;
     uint32_t frames_since_drive;
     int error; /* why the port could not be opened, as last reported */
+    int low_brc; /* the BRC pin is low; -1: not set yet on this connection */
     uint64_t reconnects, silences, commander_stops, mode_losses, missed;
     struct {
-        struct base_log_limit line, silence, back, commander, hold, mode, orders, carried;
+        struct base_log_limit line, silence, back, commander, hold, mode, orders, carried, brc;
     } log;
 };
 

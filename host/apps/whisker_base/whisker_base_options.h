@@ -14,6 +14,7 @@ struct base_options {
     bool full;         /* full mode instead of safe */
     bool stream_clock; /* time is counted in frames of the stream */
     bool wait, verbose;
+    bool brc; /* the cable has a wire to the base's BRC pin */
     struct create_odometry_settings odometry;
 };
 

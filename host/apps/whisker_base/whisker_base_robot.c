@@ -78,6 +78,7 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
     robot->error = 0;
     robot->sent = 0;
     robot->silent = false;
+    robot->low_brc = -1;
     robot->requests += robot->options->stream_clock ? 0 : (unsigned)now_ms; /* a driver before had orders of its own */
     robot->emptied_ms = now_ms;
     robot->phase_frames = 0;
@@ -358,9 +359,24 @@ static int64_t whisker_base_robot_least(int64_t a, int64_t b)
     return a < b ? a : b;
 }
 
+/* Keeps the base awake, or wakes it. */
+static void whisker_base_robot_pulse(struct base_robot *robot, int64_t now_ms)
+{
+    const bool low = now_ms % BASE_PULSE_MS < BASE_LOW_MS;
+    if (!robot->options->brc || robot->port < 0 || robot->low_brc == low) {
+        return;
+    }
+    if (!create_port_wake(robot->port, low) && robot->low_brc < 0) {
+        base_log(&robot->log.brc, LOG_WARN, "%s: --brc: this port has no line RTS; the base sleeps after 5 min of rest",
+                 robot->options->port);
+    }
+    robot->low_brc = low;
+}
+
 int base_robot_watch(struct base_robot *robot, int64_t now_ms)
 {
     base_orders_flush(robot, now_ms);
+    whisker_base_robot_pulse(robot, now_ms);
     const int64_t request_ms = base_request_due(robot, now_ms, BASE_SILENCE_MS);
     if (robot->options->stream_clock || robot->port < 0) {
         return (int)base_orders_due_ms(robot, now_ms, BASE_REOPEN_MS);

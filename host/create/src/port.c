@@ -101,6 +101,13 @@ size_t create_port_waiting(int port)
     return ioctl(port, TIOCOUTQ, &count) == 0 && count > 0 ? (size_t)count : 0;
 }
 
+/* At the levels of the base's pins an adapter's line that is set is low. */
+bool create_port_wake(int port, bool low)
+{
+    int line = TIOCM_RTS;
+    return ioctl(port, low ? TIOCMBIS : TIOCMBIC, &line) == 0;
+}
+
 /* What waits is at most an order when its writer paces itself: then the stop is behind it in a millisecond, and nothing
  * is cut. */
 bool create_port_stop(int port)

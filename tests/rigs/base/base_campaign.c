@@ -5,7 +5,7 @@
  *
  *     base_campaign FIRST COUNT [JOURNAL]
  *
- * The clock is simulated: a draw of 12 s takes milliseconds. Draw N is always the same. JOURNAL keeps the next number:
+ * The clock is simulated: a draw of 13 s takes milliseconds. Draw N is always the same. JOURNAL keeps the next number:
  * a campaign that was ended goes on behind it. Each draw that fails prints its number and why. Exit code 1: some did.
  */
 #include <errno.h>
@@ -29,10 +29,12 @@
 
 #define PORT 100000 /* no descriptor of this process */
 #define BEGIN_MS 1000
-#define FAULTS_FROM_MS 3000
-#define FAULTS_TO_MS 7000
-#define RECOVER_MS 10500 /* by then every fault is over, and its consequences */
-#define END_MS 12000
+#define FAULTS_FROM_MS 1500
+#define FAULTS_TO_MS 7500
+#define RECOVER_MS 11500 /* by then every fault is over, and its consequences */
+#define END_MS 13000
+#define NEAR_MS 250 /* every second fault begins so soon after the one before */
+#define HELP_MS 700 /* a person sends the robot on so long after its base has left its mode */
 /* The commander drives, and then stands for long enough that all motion has been reported: then odometry is measured.
  */
 #define LEG_MS 2000
@@ -40,13 +42,17 @@
 #define TICKS_PER_S (WHISKER_LIMIT_CLOCK_HZ / WHISKER_LIMIT_TICK_PERIOD)
 #define MS_TICKS ((int)(TICKS_PER_S / 1000))
 #define RX_BYTES 8192
-#define FAULTS 4
+#define FAULTS 10
 /* What the driver promises, and what it may add: order on the line, period, line back, pace. */
 #define SILENCE_MS 500
+#define COMMANDER_MS 300
 #define MARGIN_MS 60
 #define AGREE_MS 170
 #define BELIEVED_MS (BASE_SILENCE_MS + AGREE_MS)
 #define CHI2_90 6.251388631170325 /* of 3 degrees of freedom */
+#define CHI2_NEVER 150.0          /* 12 sigma: no disturbance of the line or of the wheels makes so much */
+#define FAR_M 1.0                 /* nor has a lie that wheels can have done ever led so far in a leg */
+#define HANDED_MS 500             /* within which a new commander has the driver's own mode */
 #define RESOLUTION 1e-3           /* m, rad: of the comparison; what is of second order in the errors is less */
 /* Of regions of 90 %, over at least ENOUGH disturbances. */
 #define COVER_LEAST 0.85
@@ -70,7 +76,8 @@ enum kind {
     QUIET,
     MODE,
     FLOOD,
-    STOPS, /* adapter, machine, commanders */
+    STOPS,
+    CUT, /* adapter, machine, commanders */
     LOSE,
     FLIP,
     TWICE,
@@ -88,7 +95,7 @@ static const uint32_t stimuli_of[] = {SIM_CREATE_MUTE,      SIM_CREATE_DEAF,    
 static const int longest_ms[KINDS] = {
     [MUTE] = 1500,  [DEAF] = 1500,     [SILENT] = 1500,   [HELD] = 400,    [RESTART] = 1500, [CLIFF] = 1000,
     [DROP] = 1000,  [CHARGER] = 1000,  [UNPLUG] = 1500,   [HICCUP] = 1200, [KILL] = 1,       [CHANGE] = 1,
-    [QUIET] = 1400, [MODE] = 1,        [FLOOD] = 800,     [STOPS] = 800,   [LOSE] = 60,      [FLIP] = 60,
+    [QUIET] = 1400, [MODE] = 1,        [FLOOD] = 800,     [STOPS] = 800,   [CUT] = 400,     [LOSE] = 60,      [FLIP] = 60,
     [TWICE] = 60,   [LOSE_ORDER] = 60, [FLIP_ORDER] = 60, [LIE] = 45,      [PUSH] = 500,     [BLOCK] = 600};
 
 struct fault {
@@ -117,7 +124,9 @@ static int64_t heard_ms, to_robot_ms, to_host_ms, driver_ms,
 static int commander[2];
 static int active;
 static double v, omega;
-static int64_t order_ms, ordered_ms;
+static int64_t order_ms, ordered_ms, left_ms;
+static int64_t handed_ms; /* since when a new commander drives that has asked for no mode; 0: none does */
+static bool changed;      /* and none of its orders was taken yet */
 static struct create_speeds recent[64];
 static unsigned recent_count;
 
@@ -125,8 +134,8 @@ static double true_x, true_y, true_theta, scale_distance, scale_angle, drift;
 static struct sim_create_motion counted;
 static struct create_motion seen_motion;
 static uint64_t spoilt_orders;     /* up to this byte sent to the base */
-static bool measurable, disturbed; /* since the odometry was measured last */
-static int64_t turned_ms;
+static bool measurable, disturbed, reported; /* since the odometry was measured last; reported: that it was carried */
+static int64_t turned_ms, leg_from_ms;
 static unsigned measured[2], within[2], measured_clean, within_clean;
 
 static int64_t mode_wrong_ms, wheels_wrong_ms, lied_ms, stray_ms;
@@ -135,6 +144,9 @@ static char logged[4000];
 
 /* ----------------------------------------------------------------------------------------------------------- the line
  */
+
+static bool during(enum kind kind);
+static int whole(int count);
 
 ssize_t __real_write(int fd, const void *bytes, size_t count);
 ssize_t __real_read(int fd, void *bytes, size_t room);
@@ -156,7 +168,7 @@ ssize_t __wrap_write(int fd, const void *bytes, size_t count)
         errno = EIO;
         return -1;
     }
-    const size_t taken = sim_create_receive(create, bytes, count);
+    const size_t taken = sim_create_receive(create, bytes, during(CUT) ? (size_t)whole((int)count + 1) : count);
     errno = EAGAIN;
     return taken > 0 ? (ssize_t)taken : -1;
 }
@@ -187,7 +199,9 @@ int __wrap_ioctl(int fd, unsigned long request, void *argument)
     if (fd != PORT) {
         return __real_ioctl(fd, request, argument);
     }
-    if (request == TIOCOUTQ) {
+    if (request == TIOCMBIS || request == TIOCMBIC) {
+        sim_create_pin(create, request == TIOCMBIS);
+    } else if (request == TIOCOUTQ) {
         *(int *)argument = (int)sim_create_queued(create);
     }
     return 0;
@@ -284,7 +298,7 @@ static void judge_stops(void)
     if (now_ms - heard_ms > SILENCE_MS) {
         blame("the wheels turn %lld ms after the last frame", (long long)(now_ms - heard_ms));
     }
-    if (now_ms - ordered_ms > BASE_COMMANDER_MS + MARGIN_MS && now_ms > to_host_ms + 2 * AGREE_MS) {
+    if (now_ms - ordered_ms > COMMANDER_MS + MARGIN_MS && now_ms > to_host_ms + 2 * AGREE_MS) {
         blame("the wheels turn %lld ms after the last order to drive", (long long)(now_ms - ordered_ms));
     }
 }
@@ -302,6 +316,15 @@ static void judge_mode(void)
     if (now_ms - mode_wrong_ms > most_ms) {
         blame("health says mode %s for %lld ms, the base is in %s", named, (long long)(now_ms - mode_wrong_ms),
               names[mode]);
+    }
+}
+
+/* The mode that a commander asked for holds as long as it has the command. */
+static void judge_handed(void)
+{
+    const char *wanted = health_of("wanted_mode");
+    if (handed_ms > 0 && now_ms - handed_ms > HANDED_MS && strcmp(wanted, options.full ? "full" : "safe")) {
+        blame("a new commander drives, but the mode of the one before is wanted: %s", wanted);
     }
 }
 
@@ -394,16 +417,26 @@ static double value_during(enum kind kind)
     return 0;
 }
 
-static void order(int who, const char *text)
+/* Whether it is taken. */
+static bool order(int who, const char *text)
 {
     char answer[1100];
+    bool taken = false;
     struct pollfd polled[BASE_CLIENTS];
     send(commander[who], text, strlen(text), MSG_NOSIGNAL);
     base_clients_poll(&clients, polled);
     poll(polled, BASE_CLIENTS, 0);
     base_clients_serve(&clients, polled, now_ms);
-    while (recv(commander[who], answer, sizeof answer, MSG_DONTWAIT) > 0) {
+    ssize_t got;
+    while ((got = recv(commander[who], answer, sizeof answer - 1, MSG_DONTWAIT)) > 0) {
+        answer[got] = '\0';
+        taken = !strncmp(answer, "sent", 4);
     }
+    if (changed && taken && who == active && !strncmp(text, "drive", 5)) {
+        handed_ms = now_ms;
+        changed = false;
+    }
+    return taken;
 }
 
 static void connect_client(int who)
@@ -427,6 +460,7 @@ static void leave(int who)
 static void on_step(void *context, const struct create_step *step, unsigned bits)
 {
     base_clients_step(context, step, bits);
+    reported |= bits & BASE_CARRIED;
     create_motion_add(&seen_motion, step);
 }
 
@@ -483,6 +517,8 @@ static void begin_fault(const struct fault *fault)
         break;
     case KILL:
         end_driver();
+        changed = false;
+        handed_ms = 0;
         create_port_stop(PORT); /* the guard's */
         begin_driver(robot.port < 0 ? -1 : PORT);
         break;
@@ -492,8 +528,12 @@ static void begin_fault(const struct fault *fault)
             connect_client(active);
         }
         active = 1 - active;
+        changed = true;
+        handed_ms = 0;
         break;
     case MODE:
+        changed = false;
+        handed_ms = 0;
         order(active, modes[(int)(fault->value * 3)]);
         break;
     case LOSE:
@@ -529,6 +569,9 @@ static void note_fault(const struct fault *fault)
         return;
     }
     switch (fault->kind) {
+    case CUT:
+        to_robot_ms = now_ms;
+        break;
     case DEAF:
     case SILENT:
     case RESTART:
@@ -628,8 +671,11 @@ static void command(void)
         return;
     }
     const enum create_oi_mode own = options.full ? CREATE_OI_MODE_FULL : CREATE_OI_MODE_SAFE;
-    if (now_ms >= RECOVER_MS + BEGIN_MS - 1000 && (robot.left || robot.wanted != own)) { /* a person helps */
+    left_ms = robot.left ? left_ms : now_ms;
+    const bool at_end = now_ms >= RECOVER_MS + BEGIN_MS - 1000 && (robot.left || robot.wanted != own);
+    if (at_end || now_ms - left_ms > HELP_MS) { /* a person helps */
         order(active, options.full ? "mode full" : "mode safe");
+        left_ms = now_ms;
     }
     if (now_ms >= RECOVER_MS + BEGIN_MS - 300) {
         v = 0.2;
@@ -640,8 +686,7 @@ static void command(void)
     }
     order_ms = now_ms + 40 + whole(60);
     snprintf(text, sizeof text, "drive %g %g", v, omega);
-    order(active, text);
-    if (v != 0 || omega != 0) {
+    if (order(active, text) && (v != 0 || omega != 0)) {
         ordered_ms = now_ms;
         recent[recent_count % COUNT(recent)] =
             create_choose_speeds(options.odometry.model, options.odometry.wheel_base_m, v, omega);
@@ -715,6 +760,11 @@ static void measure(void)
     }
     const double off = chi2();
     const int model = options.odometry.model == CREATE_2;
+    const double far_m = hypot(seen_motion.x - true_x, seen_motion.y - true_y);
+    if (measurable && !reported && (lied_ms > leg_from_ms ? far_m > FAR_M : off > CHI2_NEVER)) {
+        blame("the odometry is off by %.1f sigma, %.2f m, and nothing says so", sqrt(off), far_m);
+    }
+    leg_from_ms = now_ms;
     if (measurable && disturbed) {
         measured[model]++;
         within[model] += off <= CHI2_90;
@@ -725,7 +775,7 @@ static void measure(void)
     seen_motion = (struct create_motion){0};
     true_x = true_y = true_theta = 0;
     measurable = true;
-    disturbed = false;
+    disturbed = reported = false;
 }
 
 static void draw_faults(void)
@@ -734,7 +784,8 @@ static void draw_faults(void)
     for (int i = 0; i < fault_count; i++) {
         struct fault *fault = &faults[i];
         fault->kind = (enum kind)whole(KINDS);
-        fault->from_ms = BEGIN_MS + FAULTS_FROM_MS + whole(FAULTS_TO_MS - FAULTS_FROM_MS);
+        fault->from_ms = i % 2 ? fault[-1].from_ms + whole(NEAR_MS)
+                               : BEGIN_MS + FAULTS_FROM_MS + whole(FAULTS_TO_MS - FAULTS_FROM_MS);
         fault->to_ms = fault->from_ms + 1 + whole(longest_ms[fault->kind]);
         fault->value = fault->kind == PUSH ? uniform(-1, 1) : sim_rng_uniform(&rng);
         for (int k = 0; k < i; k++) { /* one cable, one machine */
@@ -762,11 +813,13 @@ static void begin_draw(uint64_t number)
     rx_count = 0;
     plugged = measurable = true;
     disturbed = false;
-    turned_ms = 0;
+    turned_ms = leg_from_ms = 0;
     spoilt_orders = 0;
     heard_ms = to_robot_ms = to_host_ms = driver_ms = order_ms = ordered_ms = 0;
     mode_wrong_ms = wheels_wrong_ms = lied_ms = stray_ms = 0;
     active = 0;
+    changed = reported = false;
+    handed_ms = left_ms = 0;
     recent_count = 0;
     v = 0.2;
     omega = 0;
@@ -784,7 +837,7 @@ static void begin_draw(uint64_t number)
 
 static const char *const kind_names[KINDS] = {"mute",  "deaf",       "silent",     "held",   "restart", "cliff",
                                               "drop",  "charger",    "unplug",     "hiccup", "kill",    "change",
-                                              "quiet", "mode",       "flood",      "stops",  "lose",    "flip",
+                                              "quiet", "mode",       "flood",      "stops",  "cut",     "lose",    "flip",
                                               "twice", "lose-order", "flip-order", "lie",    "push",    "block"};
 
 static void run_draw(uint64_t number)
@@ -809,6 +862,7 @@ static void run_draw(uint64_t number)
         if (now_ms % 5 == 0) {
             judge_mode();
             judge_wheels();
+            judge_handed();
         }
         judge_speeds();
         judge_recovery();
@@ -816,6 +870,28 @@ static void run_draw(uint64_t number)
     }
     end_driver();
     sim_create_free(create);
+}
+
+/* A base that is let go for seven minutes, with a wire to its BRC pin or without; whether it is heard at the end. */
+static bool stays_awake(bool wire)
+{
+    begin_draw(0);
+    fault_count = 0;
+    options.brc = wire;
+    order(0, "mode passive");
+    for (const int64_t end_ms = now_ms + 7 * 60000; now_ms < end_ms; now_ms++) {
+        for (int i = 0; i < MS_TICKS; i++) {
+            sim_create_tick(create, &counted);
+        }
+        receive();
+        if (base_robot_read(&robot, UINT64_MAX, now_ms)) {
+            base_robot_watch(&robot, now_ms);
+        }
+    }
+    const bool heard = base_robot_heard(&robot);
+    end_driver();
+    sim_create_free(create);
+    return heard;
 }
 
 static void print_failure(uint64_t number)
@@ -868,6 +944,10 @@ int main(int argc, char **argv)
     const char *journal = argc > 3 ? argv[3] : NULL;
     unsigned failed = 0;
     signal(SIGPIPE, SIG_IGN);
+    if (stays_awake(false) || !stays_awake(true)) {
+        puts("a base sleeps after five minutes of rest, unless its pin is pulsed: not so");
+        return 1;
+    }
     for (uint64_t number = read_journal(journal, first); number < end; number++) {
         run_draw(number);
         if (why[0]) {

@@ -35,6 +35,9 @@ int create_port_write(int port, const uint8_t *bytes, size_t count);
 /* Bytes written that have not left, as far as the system says. */
 size_t create_port_waiting(int port);
 
+/* Sets the RTS line, which an adapter's cable may lead to the base's BRC pin: low, or high. False: it has none. */
+bool create_port_wake(int port, bool low);
+
 /* Stops the wheels: what has not left is thrown away if it is in the way, and what was cut by that ends in zero bytes.
  * False: it was not written whole. Try again. */
 bool create_port_stop(int port);
