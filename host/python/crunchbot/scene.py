@@ -17,6 +17,7 @@ from .files import UnreadableError
 from .images import nearest_levels, read_grey
 from .observation import Column, Layout, Quantity
 from .occupancy import NOWHERE, Box, Pose, from_map, placed, read_map, spread_on_map, to_map
+from .outputs import put
 from .scene_table import ANGLE_MOST, FARTHEST_M, LARGEST_M, SceneError, Table
 from .sensor_tables import SensorTable, read_sensors, write_sensor
 
@@ -295,7 +296,7 @@ def _write(path: Path, content: dict) -> None:
     """Tables of which there is none are left out."""
     import tomli_w  # only who writes a scene needs it
 
-    path.write_text(tomli_w.dumps({key: value for key, value in content.items() if value != []}))
+    put(path, tomli_w.dumps({key: value for key, value in content.items() if value != []}))
 
 
 def _line(word: str, *values) -> str:

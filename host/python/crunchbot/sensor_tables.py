@@ -4,6 +4,7 @@ robot.toml names them as [[sensor]]: an image of grey levels over the whole aren
 readings and a column for each level.
 """
 
+import io
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from .files import UnreadableError
 from .images import Grey, nearest_levels, read_grey
+from .outputs import put
 from .scene_table import LARGEST_M, SceneError, Table
 from .tables import TableError, numbers, read_columns
 
@@ -95,10 +97,12 @@ def write_sensor(folder: Path, sensor: SensorTable) -> dict:
     codes = sensor.codes[::-1]
     grey = np.round(255.0 * np.minimum(codes, levels - 1) / max(levels - 1, 1)).astype(np.uint8)
     alpha = np.where(codes == NOT_KNOWN, 0, 255).astype(np.uint8)
-    Image.fromarray(np.dstack([grey, alpha]), "LA").save(folder / f"{sensor.name}.png")
+    image = io.BytesIO()
+    Image.fromarray(np.dstack([grey, alpha]), "LA").save(image, "png")
+    put(folder / f"{sensor.name}.png", image.getvalue())
     lines = [",".join([*EDGES, *(f"level{n}" for n in range(levels))])]
     rows = np.column_stack([sensor.edges[:-1], sensor.edges[1:], sensor.likelihood]).tolist()
-    (folder / f"{sensor.name}.csv").write_text("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]) + "\n")
+    put(folder / f"{sensor.name}.csv", "\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]) + "\n")
     places = {"map": f"{sensor.name}.png", "table": f"{sensor.name}.csv"}
     return {
         "name": sensor.name,

@@ -15,6 +15,7 @@ from pathlib import Path
 from crunchbot.arguments import RING, number_above, whole_number
 from crunchbot.bridge.ring import Reader, RingError
 from crunchbot.errors import UserError
+from crunchbot.outputs import put
 from crunchbot.programs import SOURCE_TREE, program
 from crunchbot.stopping import stop_on_signals
 from whisker_protocol import LANES, LIMITS
@@ -98,13 +99,13 @@ def _command(arguments, folder: Path) -> list[str]:
         return _pico_command(arguments)
     text, whiskers = flat_scene(arguments.scene, arguments.seed, arguments.mechanics)
     lanes = max(arguments.lanes or whiskers, whiskers)
-    (folder / "scene.flat").write_text(text)
+    put(folder / "scene.flat", text, sync=False)
     words = [program("umockdev-wrapper")] if arguments.usbip is None else []
     words += [program("whisker-bridge-sim"), "--scene", folder / "scene.flat"]
     words += ["--seconds", arguments.seconds, "--seed", arguments.seed, "--lanes-populated", lanes]
     words += ["--socket", folder / "sim.sock", "--followers", 1, "--level", arguments.level]
     if arguments.fault:
-        (folder / "faults").write_text(read_faults(arguments.fault, TICKS_PER_S))
+        put(folder / "faults", read_faults(arguments.fault, TICKS_PER_S), sync=False)
         words += ["--fault-list", folder / "faults"]
     mask = (1 << lanes) - 1
     if arguments.usbip is None:

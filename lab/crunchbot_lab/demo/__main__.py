@@ -5,7 +5,6 @@ import csv
 import json
 import multiprocessing
 import os
-import shutil
 import sys
 import time
 from collections.abc import Callable
@@ -20,6 +19,7 @@ from tqdm import tqdm
 from crunchbot import scene as scenes
 from crunchbot.arguments import whole_number
 from crunchbot.nav import localise
+from crunchbot.outputs import made, opened, put
 from crunchbot.stopping import interrupt_on_signals
 from crunchbot.tables import TableError
 
@@ -121,9 +121,15 @@ def prepare(options: argparse.Namespace) -> tuple[Path, scenes.Scene, tuple[floa
     """The output folder with the scene in it, the scene, and the true start."""
     out = fresh_folder(options.out.resolve())
     scene, start = make_scene(options.seed, options.mechanics)
-    scenes.write(out / "scene", scene)
-    (out / "scene" / "scene.flat").write_text(scene.flat(start))
+    write_world(out / "scene", scene, start)
     return out, scene, start
+
+
+def write_world(path: Path, scene: scenes.Scene, start: tuple[float, float, float]) -> None:
+    """The scene, with the text that the simulation takes and the true start in it."""
+    with made(path, own=("*",)) as folder:
+        scenes.write(folder, scene)
+        put(folder / "scene.flat", scene.flat(start))
 
 
 def replay_seeds(out: Path, scene: scenes.Scene, options: argparse.Namespace) -> None:
@@ -145,7 +151,7 @@ def replay_seeds(out: Path, scene: scenes.Scene, options: argparse.Namespace) ->
 
 def write_dicts(path: Path, header: list[str], rows: list[dict]) -> None:
     """A CSV file of rows by column."""
-    with open(path, "w", newline="") as file:
+    with opened(path, True) as file:
         writer = csv.DictWriter(file, header, lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
@@ -153,18 +159,17 @@ def write_dicts(path: Path, header: list[str], rows: list[dict]) -> None:
 
 def write_summary(out: Path, results: dict) -> None:
     """summary.json, with six decimals."""
-    (out / "summary.json").write_text(json.dumps(scores.rounded(results), indent=1) + "\n")
+    put(out / "summary.json", json.dumps(scores.rounded(results), indent=1) + "\n")
 
 
 def fresh_folder(path: Path) -> Path:
     """An empty output folder; what an earlier demo left there is removed, anything else is not."""
     if path.exists() and not (path / MARK).exists() and any(path.iterdir()):
         raise ChainError(f"{path}: not empty, and not left by an earlier demo; choose another --out")
-    if path.exists():
-        shutil.rmtree(path)
-    path.mkdir(parents=True)
-    (path / MARK).write_text("Written by python -m crunchbot_lab.demo, which may remove this folder.\n")
-    (path / "origin.json").write_text(json.dumps(origin.of_this_run(), indent=1) + "\n")
+    with made(path, own=("*",)) as folder:
+        folder.mkdir()
+        put(folder / MARK, "Written by python -m crunchbot_lab.demo, which may remove this folder.\n")
+        put(folder / "origin.json", json.dumps(origin.of_this_run(), indent=1) + "\n")
     return path
 
 
@@ -233,7 +238,7 @@ def add_truth(path: Path, truth: list[dict[str, str]]) -> None:
     if len(rows) != len(truth):
         raise TableError(path, None, f"{len(rows)} rows but {len(truth)} true poses; see the logs beside it")
     names = ("x_m", "y_m", "theta_rad")
-    with open(path, "w", newline="") as file:
+    with opened(path, True) as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*rows[0], *(f"true_{name}" for name in names)])
         writer.writerows(

@@ -6,13 +6,12 @@ follow from: the scene with its whiskers, the seed, and the programs that record
 
 import hashlib
 import os
-import shutil
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 import crunchbot
-from crunchbot.outputs import made
+from crunchbot.outputs import made, put
 from crunchbot.scene import Scene
 
 from . import training
@@ -26,7 +25,7 @@ def learn_or_copy(folder: Path, scene: Scene, seed: int, progress: Callable[[], 
     if place.is_dir():
         folder.mkdir(parents=True, exist_ok=True)
         for model in sorted(place.glob("*.json")):
-            shutil.copyfile(model, folder / model.name)
+            put(folder / model.name, model.read_bytes())
             progress()
         return f"copied from {place}"
     training.learn(folder, scene, seed, progress)
@@ -65,4 +64,4 @@ def _keep(folder: Path, place: Path) -> None:
     with made(place, True, ("*.json",)) as whole:
         whole.mkdir()
         for model in folder.glob("*.json"):
-            shutil.copyfile(model, whole / model.name)
+            put(whole / model.name, model.read_bytes())

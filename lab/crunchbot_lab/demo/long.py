@@ -21,6 +21,7 @@ from crunchbot.arguments import warn
 from crunchbot.nav import localise
 from crunchbot.nav.scoring import position_errors
 from crunchbot.observation import cell
+from crunchbot.outputs import put
 from crunchbot.pilot.behaviour import BLOCK_TICKS
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.recording.mcapfile import McapFile
@@ -104,9 +105,7 @@ def explore_signals(
     observations = localise.read_observations(path, scene)
     for name in tqdm(FILTERS, desc="filters", unit="filter"):
         localise.write_estimates(out / f"est_{name}.csv", localise.run(name, scene, observations), observations)
-    (out / "pilot.json").write_text(
-        json.dumps({"rows": len(rows), "whisks": pilot.whisks, "base": {}}, indent=1) + "\n"
-    )
+    put(out / "pilot.json", json.dumps({"rows": len(rows), "whisks": pilot.whisks, "base": {}}, indent=1) + "\n")
     return {"chain_wall_s": time.monotonic() - began, "contacts": onsets.count}
 
 

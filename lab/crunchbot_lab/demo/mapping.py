@@ -21,6 +21,7 @@ from crunchbot import scene as scenes
 from crunchbot.nav import localise
 from crunchbot.nav.scoring import lock_row
 from crunchbot.occupancy import to_map
+from crunchbot.outputs import made
 from crunchbot.robot.policy import MAP
 
 from ..report import map_page
@@ -41,6 +42,7 @@ from .__main__ import (
     seconds_of_rows,
     simulate,
     write_summary,
+    write_world,
 )
 
 FILTERS = ("adaptive",)
@@ -74,7 +76,8 @@ def demonstrate(options: argparse.Namespace) -> dict:
     results["explore"] = simulate(first)
     results["map"] = judge_map(out, scene)
     again = folder_of(out / "again", scene, draw_start(scene.arena, np.random.default_rng([options.seed, 2])))
-    shutil.copytree(explore / "models", again / "models")
+    with made(again / "models", own=("*",)) as models:
+        shutil.copytree(explore / "models", models)
     known = known_scene(out / "known", scenes.load(out / "map"))
     second = argparse.Namespace(**vars(options) | {"seconds": options.again, "seed": options.seed + 1})
     results["again"] = simulate(chain_of(again, second, options.level, filters=FILTERS, known=known))
@@ -90,8 +93,7 @@ def demonstrate(options: argparse.Namespace) -> dict:
 def folder_of(path: Path, scene: scenes.Scene, start: tuple[float, float, float]) -> Path:
     """A folder for a run of this scene from this true start."""
     path.mkdir()
-    scenes.write(path / "scene", scene)
-    (path / "scene" / "scene.flat").write_text(scene.flat(start))
+    write_world(path / "scene", scene, start)
     return path
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from crunchbot.outputs import opened, put
 from crunchbot.pilot.behaviour import EXPLORE_M_S, PUSH_TICKS, TURN_RAD_S
 from crunchbot.scene import Scene
 from crunchbot.touch.contact import REST_SAMPLES, Contact
@@ -51,7 +52,7 @@ def learn(
         contacts[whisker.name] = calibrate(folder, scene, whisker.name, seed)
         progress()
     lists = {name: {key: [part.tolist() for part in pair] for key, pair in of.items()} for name, of in contacts.items()}
-    (folder / CONTACTS).write_text(json.dumps(lists) + "\n")
+    put(folder / CONTACTS, json.dumps(lists) + "\n")
     return calibrations(folder)
 
 
@@ -127,7 +128,7 @@ def radial_scores(scene: Scene, models: dict[str, RadialModel], contacts: dict[s
 
 def write_radial_points(folder: Path, models: dict[str, RadialModel], contacts: dict[str, dict]) -> None:
     """radial_points.csv and radial_lines.json, for the report."""
-    with open(folder / "radial_points.csv", "w", newline="") as file:
+    with opened(folder / "radial_points.csv", True) as file:
         writer = csv.writer(file)
         writer.writerow(("whisker", "set", "radius_mm", "peak_counts", "predicted_mm"))
         for name, sets in contacts.items():
@@ -137,7 +138,7 @@ def write_radial_points(folder: Path, models: dict[str, RadialModel], contacts: 
                     for r, p in zip(*points, strict=True)
                 )
     lines = {name: [model.a1, model.a0] for name, model in models.items()}
-    (folder / "radial_lines.json").write_text(json.dumps(lines, indent=1) + "\n")
+    put(folder / "radial_lines.json", json.dumps(lines, indent=1) + "\n")
 
 
 def flat(scene: Scene) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 
 from crunchbot.nav.observations import Observations
 from crunchbot.observation import ODOMETRY, TIME, TRUTH, Quantity
+from crunchbot.outputs import put
 from crunchbot.scene import OBSERVATIONS, Scene, write
 
 DECIMALS = 6  # m, rad, nats; distances are rounded in mm to three
@@ -47,7 +48,7 @@ def write_scene(path: str | Path, scene: Scene, observations: Observations) -> N
         header += TRUTH
         columns += _numbers(observations.truth)
     lines = [",".join(header), *map(",".join, zip(*columns, strict=True))]
-    (Path(path) / OBSERVATIONS).write_text("\n".join(lines) + "\n")
+    put(Path(path) / OBSERVATIONS, "\n".join(lines) + "\n")
 
 
 def _numbers(values: np.ndarray) -> list[list[str]]:

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from crunchbot.outputs import put
+
 from .world import TICK_S, World
 
 SPEEDS_M_S = (0.05, 0.1, 0.15, 0.2)
@@ -75,7 +77,7 @@ def write_surface_drives(
         place.mkdir(parents=True, exist_ok=True)
         for k, speed in enumerate(speeds):
             for whisker, counts in surface_drive(flat, surface, speed, seconds, _derive(seed, n, k), moves).items():
-                _write_csv(place / f"{whisker}_{k + 1}.csv", "t_s,x,y", [], counts)
+                _write_csv(place / f"{whisker}_{k + 1}.csv", "t_s,x,y", [("", counts)])
 
 
 def surface_sweep(flat: str, whisker: str, surface: str, seed: int, whisk: bool) -> np.ndarray:
@@ -119,7 +121,7 @@ def write_surface_sweeps(folder: Path, flat: str, surfaces: Iterable[str], seed:
         for lane, whisker in enumerate(_names(flat, "object_whisker")):
             for k in range(count):
                 counts = surface_sweep(flat, whisker, surface, _derive(seed, n, lane, k), bool(k % 2))
-                _write_csv(place / f"{whisker}_{k + 1}.csv", "t_s,x,y", [], counts)
+                _write_csv(place / f"{whisker}_{k + 1}.csv", "t_s,x,y", [("", counts)])
 
 
 def radial_contacts(
@@ -141,9 +143,8 @@ def radial_contacts(
 def write_radial_contacts(path: Path, contacts: Sequence[RadialContact]) -> None:
     """Write one whisker's contacts; they are numbered from 0, and time starts at 0 in each."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    for n, contact in enumerate(contacts):
-        columns = [str(n), f"{contact.radius_mm:g}"]
-        _write_csv(path, "contact,radius_mm,t_s,x,y", columns, contact.counts, append=n > 0)
+    parts = [(f"{n},{contact.radius_mm:g},", contact.counts) for n, contact in enumerate(contacts)]
+    _write_csv(path, "contact,radius_mm,t_s,x,y", parts)
 
 
 def _whisk(world: World, lane: int, side: int, push_s: float) -> np.ndarray:
@@ -206,10 +207,7 @@ def _derive(seed: int, *path: int) -> int:
     return int(np.random.SeedSequence([seed, *path]).generate_state(1, np.uint64)[0])
 
 
-def _write_csv(path: Path, header: str, columns: list[str], counts: np.ndarray, append: bool = False) -> None:
-    start = "".join(f"{column}," for column in columns)
-    rows = [f"{start}{n * TICK_S:.4f},{x},{y}\n" for n, (x, y) in enumerate(counts.tolist())]
-    with path.open("a" if append else "w") as file:
-        if not append:
-            file.write(header + "\n")
-        file.writelines(rows)
+def _write_csv(path: Path, header: str, parts: Iterable[tuple[str, np.ndarray]]) -> None:
+    """parts: the beginning of each line, and counts (n, 2)."""
+    lines = [f"{start}{n * TICK_S:.4f},{x},{y}" for start, part in parts for n, (x, y) in enumerate(part.tolist())]
+    put(path, "\n".join([header, *lines]) + "\n")

@@ -110,7 +110,7 @@ def _write_units(arguments) -> int:
     with made(arguments.units, arguments.overwrite, HELD) as folder:
         folder.mkdir()
         for name, text in described.items():
-            (folder / name).write_text(text)
+            put(folder / name, text)
     print(
         f"{arguments.units}: {', '.join(described)}; next: copy them to /etc/systemd/system, systemctl enable --now {TARGET}"
     )

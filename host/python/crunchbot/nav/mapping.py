@@ -1,5 +1,6 @@
 """A map from the rows of a scene folder, without the arena that the folder may hold; and the folder that is written."""
 
+import io
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -8,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..occupancy import FREE, SOLID, Pose, from_map
-from ..outputs import made
+from ..outputs import made, put
 from ..progress import bar
 from ..scene import HELD as HELD_BY_SCENE
 from ..scene import OBSERVATIONS, Arena, Prior, Robot, Scene, load_robot, write
@@ -140,7 +141,7 @@ def _write_one(folder: Path, mapped: Mapped) -> MapScene:
 
 
 def _write_table(path: Path, lines: list[str]) -> None:
-    path.write_text("\n".join(lines) + "\n")
+    put(path, "\n".join(lines) + "\n")
 
 
 def _faces(touched: TouchMap, origin: Pose) -> list[str]:
@@ -189,10 +190,13 @@ def _write_image(folder: Path, made: MapScene) -> None:
     grey = np.full(made.cells.shape, GREY_UNKNOWN, np.uint8)
     for kind, level in GREYS.items():
         grey[made.cells == kind] = level
-    Image.fromarray(grey[::-1]).save(folder / IMAGE)
-    np.save(folder / CELLS, made.occupied)
+    image, cells = io.BytesIO(), io.BytesIO()
+    Image.fromarray(grey[::-1]).save(image, "png")
+    np.lib.format.write_array(cells, made.occupied)
+    put(folder / IMAGE, image.getvalue())
+    put(folder / CELLS, cells.getvalue())
     text = f"image: {IMAGE}\nmode: trinary\nresolution: {CELL_M}\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n"
-    (folder / MAP).write_text(text + "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+    put(folder / MAP, text + "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
 
 
 def summary(mapped: Mapped, made: MapScene) -> dict:

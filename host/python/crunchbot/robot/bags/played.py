@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import UserError
+from ...outputs import put
 from ...progress import bar
 from ...recording.mcapfile import McapFile, Message
 from ...recording.rosbag import RosBag, open_bag
@@ -101,5 +102,5 @@ def _scene(reported: dict[str, str]) -> Scene | None:
         return None
     with tempfile.TemporaryDirectory(prefix="whisker-") as place:
         for name, text in files.items():
-            (Path(place) / name).write_text(text)
+            put(Path(place) / name, text, sync=False)
         return load(place)
