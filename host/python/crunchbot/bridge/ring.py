@@ -342,8 +342,14 @@ class Reader:
 
 
 def await_reader(name: str, wait_s: float, stop: threading.Event, owner: int | None = None) -> Reader:
-    """A Reader of a ring that is waited for until `wait_s` are over or `stop` is set; RingError says why there is none."""
-    return Reader(name, wait_s, owner, stop)
+    """A Reader of a ring that is waited for until `wait_s` are over; RingError says why there is none. KeyboardInterrupt:
+    `stop` is set."""
+    try:
+        return Reader(name, wait_s, owner, stop)
+    except RingError:
+        if stop.is_set():
+            raise KeyboardInterrupt from None
+        raise
 
 
 class Writer:

@@ -9,6 +9,7 @@ from ..nav import localise
 from ..nav.faults import row_faults
 from ..nav.localise import SettingError
 from ..scene import PRIOR, SceneError, load
+from ..tables import TableError
 
 EXAMPLE = "whisker localise examples/scene --filter grid --set grid.cell_m=0.1 --out est.csv --json"
 
@@ -51,6 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"whisker: warning: {warning}", file=sys.stderr)
     path = localise.observations_path(arguments.scene)
     observations = localise.read_observations(path, scene)
+    if not len(observations):
+        raise TableError(path, None, "no rows; record some")
     for fault in row_faults(observations, scene.robot):
         print(f"whisker: warning: {path}: {fault}", file=sys.stderr)
     settings, regions = _settings(arguments.set), localise.REGION_ROWS

@@ -81,8 +81,10 @@ def test_who_ends_by_an_interrupt_gets_one():
 def test_a_ring_is_not_waited_for_when_it_is_to_stop():
     stop = threading.Event()
     stop.set()
-    with pytest.raises(RingError):
+    with pytest.raises(KeyboardInterrupt):
         await_reader("whisker-test-no-such-ring", 1e6, stop)
+    with pytest.raises(RingError):
+        await_reader("whisker-test-no-such-ring", 0.0, threading.Event())
 
 
 def test_a_wait_for_a_ring_without_an_end_hears_signals_and_the_wish_to_stop():
