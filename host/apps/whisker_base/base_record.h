@@ -106,7 +106,7 @@ struct base_robot {
     struct create_ordered ordered; /* since the newest frame, up to ordered_ms */
     int64_t ordered_ms;
     uint32_t frames_since_drive;
-    int error; /* why the port could not be opened, as last reported */
+    int error;   /* why the port could not be opened, as last reported */
     int low_brc; /* the BRC pin is low; -1: not set yet on this connection */
     uint64_t reconnects, silences, commander_stops, mode_losses, missed;
     struct {

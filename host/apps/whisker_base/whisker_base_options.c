@@ -102,8 +102,8 @@ static const struct command_option OPTIONS[] = {
     OWN("relative-sigma", "X", "standard deviation of these two scales (0.05)", number),
     OWN("requested-sigma", "X", "the same where requested speeds are integrated (0.1)", number),
     OWN("drift", "RAD_PER_M", "standard deviation of the heading per distance (0.05)", number),
-    {"brc", NULL, "the cable leads RTS to the base's BRC pin: a pulse each minute keeps it awake", COMMAND_FLAG, AT(brc), 0,
-     0, NULL},
+    {"brc", NULL, "the cable leads RTS to the base's BRC pin: a pulse each minute keeps it awake", COMMAND_FLAG,
+     AT(brc), 0, 0, NULL},
     {"wait", NULL, "wait for the port instead of failing when there is none", COMMAND_FLAG, AT(wait), 0, 0, NULL},
     {"verbose", NULL, "log successful steps, too", COMMAND_FLAG, AT(verbose), 0, 0, NULL},
 };

@@ -93,10 +93,11 @@ static const uint32_t stimuli_of[] = {SIM_CREATE_MUTE,      SIM_CREATE_DEAF,    
                                       SIM_CREATE_HELD,      SIM_CREATE_RESTART, SIM_CREATE_CLIFF_FRONT_LEFT,
                                       SIM_CREATE_DROP_LEFT, SIM_CREATE_CHARGER};
 static const int longest_ms[KINDS] = {
-    [MUTE] = 1500,  [DEAF] = 1500,     [SILENT] = 1500,   [HELD] = 400,    [RESTART] = 1500, [CLIFF] = 1000,
-    [DROP] = 1000,  [CHARGER] = 1000,  [UNPLUG] = 1500,   [HICCUP] = 1200, [KILL] = 1,       [CHANGE] = 1,
-    [QUIET] = 1400, [MODE] = 1,        [FLOOD] = 800,     [STOPS] = 800,   [CUT] = 400,     [LOSE] = 60,      [FLIP] = 60,
-    [TWICE] = 60,   [LOSE_ORDER] = 60, [FLIP_ORDER] = 60, [LIE] = 45,      [PUSH] = 500,     [BLOCK] = 600};
+    [MUTE] = 1500,     [DEAF] = 1500,     [SILENT] = 1500,  [HELD] = 400,    [RESTART] = 1500,
+    [CLIFF] = 1000,    [DROP] = 1000,     [CHARGER] = 1000, [UNPLUG] = 1500, [HICCUP] = 1200,
+    [KILL] = 1,        [CHANGE] = 1,      [QUIET] = 1400,   [MODE] = 1,      [FLOOD] = 800,
+    [STOPS] = 800,     [CUT] = 400,       [LOSE] = 60,      [FLIP] = 60,     [TWICE] = 60,
+    [LOSE_ORDER] = 60, [FLIP_ORDER] = 60, [LIE] = 45,       [PUSH] = 500,    [BLOCK] = 600};
 
 struct fault {
     enum kind kind;
@@ -133,7 +134,7 @@ static unsigned recent_count;
 static double true_x, true_y, true_theta, scale_distance, scale_angle, drift;
 static struct sim_create_motion counted;
 static struct create_motion seen_motion;
-static uint64_t spoilt_orders;     /* up to this byte sent to the base */
+static uint64_t spoilt_orders;               /* up to this byte sent to the base */
 static bool measurable, disturbed, reported; /* since the odometry was measured last; reported: that it was carried */
 static int64_t turned_ms, leg_from_ms;
 static unsigned measured[2], within[2], measured_clean, within_clean;
@@ -835,10 +836,10 @@ static void begin_draw(uint64_t number)
     frame_count = 0;
 }
 
-static const char *const kind_names[KINDS] = {"mute",  "deaf",       "silent",     "held",   "restart", "cliff",
-                                              "drop",  "charger",    "unplug",     "hiccup", "kill",    "change",
-                                              "quiet", "mode",       "flood",      "stops",  "cut",     "lose",    "flip",
-                                              "twice", "lose-order", "flip-order", "lie",    "push",    "block"};
+static const char *const kind_names[KINDS] = {
+    "mute",   "deaf",  "silent",     "held",       "restart", "cliff", "drop",  "charger", "unplug",
+    "hiccup", "kill",  "change",     "quiet",      "mode",    "flood", "stops", "cut",     "lose",
+    "flip",   "twice", "lose-order", "flip-order", "lie",     "push",  "block"};
 
 static void run_draw(uint64_t number)
 {
