@@ -190,12 +190,11 @@ def markdown() -> str:
     out += _table("codes", "value", p.DEFINITION["codes"], "value") + _table(
         "sensor error bits", "bit", p.SENSOR_ERRORS, "bit"
     )
-    for table in FLAGS:
-        out += [f"## {table}", "", "| bit | name | meaning |", "|---|---|---|"]
-        out += [f"| {e['bit']} | {name} | {e['doc']} |" for name, e in p.DEFINITION[table].items()] + [""]
-    for table in NUMBERED:
-        out += [f"## {table}", "", "| value | name | meaning |", "|---|---|---|"]
-        out += [f"| {e['value']} | {name} | {e['doc']} |" for name, e in p.DEFINITION[table].items()] + [""]
+    out += ["## names and numbers", "", "| of | number or bit | name | meaning |", "|---|---|---|---|"]
+    for table, key in [*((flags, "bit") for flags in FLAGS), *((numbered, "value") for numbered in NUMBERED)]:
+        entries = p.DEFINITION[table].items()
+        out += [f"| {table} | {'bit ' if key == 'bit' else ''}{e[key]} | {name} | {e['doc']} |" for name, e in entries]
+    out.append("")
     out += ["## limits", "", "| name | value | unit | meaning |", "|---|---|---|---|"]
     for name, e in p.DEFINITION["limits"].items():
         out.append(f"| {name} | {e['value']} | {e.get('unit', '')} | {e.get('doc', '')} |")
