@@ -6,7 +6,7 @@ BUILD := build/release
 PYTHON := .venv/bin/python
 SOURCES_C = $(shell git ls-files '*.c' '*.h' '*.cpp' | grep -v '/gen/')
 
-.PHONY: help demo demo-rtl demo-map demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-check sbom build build-demo setup setup-demo setup-tests example-data docs gen firmware firmware-images firmware-check flash bitstream format lint clean
+.PHONY: help demo demo-rtl demo-map demo-long test test-all test-kernel test-hil mutants bench wheels wheels-check debian release release-offline release-check sbom build build-demo setup setup-demo setup-tests example-data docs gen firmware firmware-images firmware-check flash bitstream format lint clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -54,8 +54,11 @@ wheels-check: wheels ## the wheels as users get them: empty environments, a simu
 debian: ## Debian packages into dist/debian, built in and tried in roots of their own: [RELEASES="bookworm trixie"]; as root
 	@python3 tools/debian $(RELEASES)
 
-release: build sbom ## what a release consists of, into dist/: wheels, bitstreams, node images, sources, SHA256SUMS; [BOARDS="a b"] [USB_ID=vid:pid]
+release: build sbom ## what users download, into dist/: wheels, Debian packages, bitstreams, images, site, RELEASE.md, SHA256SUMS; [BOARDS="a b"] [USB_ID=vid:pid]
 	@$(PYTHON) tools/release $(if $(BOARDS),--boards $(BOARDS)) $(if $(USB_ID),--usb-id "$(USB_ID)")
+
+release-offline: ## each remedy that names a package, against the files of dist/ alone: make release, or make wheels, before
+	@WHISKER_DIST=dist $(PYTHON) -m pytest --quiet tests/repository/test_offline.py
 
 release-check: build sbom ## make a release twice and compare every byte; [BOARDS="a b"]
 	@$(PYTHON) tools/release --twice $(if $(BOARDS),--boards $(BOARDS)) $(if $(USB_ID),--usb-id "$(USB_ID)")

@@ -38,6 +38,9 @@ if [ "${1:-}" = --long ]; then
         echo "test: the site of pages and API"
         (cd tools && ../.venv/bin/python -m handbook)
     fi
+    echo "test: remedies that name a package, against the wheels alone"
+    .venv/bin/python tools/wheels
+    WHISKER_DIST=dist .venv/bin/python -m pytest --quiet tests/repository/test_offline.py
     echo "test: mutated recordings"
     .venv/bin/python host/python/tests/fuzz.py recording --inputs 300000
     echo "test: a Linux kernel and the simulated bridge"

@@ -1,7 +1,9 @@
 """What a release says of itself: versions, citation, licences, the forges' files."""
 
 import importlib.util
+import os
 import re
+import tarfile
 
 import pytest
 import yaml
@@ -74,14 +76,88 @@ def test_the_debian_packages_are_of_this_version_and_all_are_built():
     }
 
 
-def test_the_second_of_two_releases_copies_no_run_of_the_first(monkeypatch):
-    """The tools of the bitstreams keep their runs; a comparison with a copy would always find the same bytes."""
+@pytest.fixture
+def release(monkeypatch, tmp_path):
+    """The tool, with a dist/ of its own."""
     spec = importlib.util.spec_from_file_location("release", ROOT / "tools/release/__main__.py")
-    release = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(release)
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    monkeypatch.setattr(made, "DIST", tmp_path)
+    return made
+
+
+def test_the_page_of_a_release_has_a_line_for_each_file_and_what_is_missing(release, tmp_path):
+    version = __version__
+    for name in (
+        f"crunchbot-{version}-cp311-abi3-manylinux_2_27_x86_64.manylinux_2_28_x86_64.whl",
+        f"crunchbot_sim-{version}-py3-none-manylinux_2_34_x86_64.whl",
+        "crunchbot-debian-bookworm.tar",
+        "crunchbot-firmware.tar.gz",
+        "ecpix5-28-testid.bit",
+        "ecpix5-28.wgw",
+    ):
+        (tmp_path / name).write_bytes(b"x" * 200_000)
+    page = release.page({"site": "doxygen is not installed; run: apt-get install doxygen"})
+    lines = [line.split("|") for line in page.splitlines() if line.startswith("| `")]
+    assert [line[1].strip(" `") for line in lines] == sorted(path.name for path in tmp_path.iterdir())
+    assert all(line[2].strip() == "0.2" and len(line[3]) > 10 for line in lines) and "for tests only" in page
+    assert "\n- site: doxygen is not installed; run: apt-get install doxygen\n" in page
+    (tmp_path / "of_nobody.bin").write_bytes(b"")
+    with pytest.raises(StopIteration):
+        release.page({})
+
+
+def test_an_archive_of_a_release_is_the_same_for_the_same_files(release, tmp_path):
+    folder = tmp_path / "folder"
+    (folder / "a/b").mkdir(parents=True)
+    (folder / "a/b/c.txt").write_text("c")
+    (folder / "d.txt").write_text("d")
+    for name in ("x.tar.gz", "x.tar"):
+        release.pack(folder, name)
+        first = (tmp_path / name).read_bytes()
+        os.utime(folder / "d.txt", (1, 1))
+        release.pack(folder, name)
+        assert (tmp_path / name).read_bytes() == first
+        with tarfile.open(tmp_path / name) as archive:
+            assert sorted(archive.getnames()) == ["x/a/b/c.txt", "x/d.txt"]
+
+
+def test_what_cannot_be_made_is_named_and_the_rest_is_made(release, tmp_path, monkeypatch, capsys):
+    (tmp_path / "build").mkdir()
+    (tmp_path / "build/sbom.json").write_text("{}")
+    (tmp_path / "firmware/images").mkdir(parents=True)
+    out = tmp_path / "dist"
+    monkeypatch.setattr(release, "ROOT", tmp_path)
+    monkeypatch.setattr(release, "DIST", out)
+
+    def run(*words, folder=None):
+        if "tools/wheels" in words:
+            out.mkdir()
+        if "--list" in words:
+            return "ecpix5 ulx3s"
+        if "handbook" in words:
+            raise release.CannotError("-m handbook failed: doxygen is not installed")
+        return ""
+
+    monkeypatch.setattr(release, "run", run)
+    monkeypatch.setattr(release, "pack_sources", lambda: None)
+    monkeypatch.setattr(release.os, "getuid", lambda: 1000)
+    sums = release.make([], None)
+    assert [line.split()[1] for line in sums.splitlines()] == ["RELEASE.md", "crunchbot-firmware.tar.gz", "sbom.json"]
+    page = (out / "RELEASE.md").read_text()
+    for line in (
+        "site: -m handbook failed: doxygen",
+        "Debian packages: needs root",
+        "bitstream of ulx3s: was not asked",
+    ):
+        assert f"- {line}" in page
+
+
+def test_the_second_of_two_releases_copies_no_run_of_the_first(release, monkeypatch):
+    """The tools of the bitstreams keep their runs; a comparison with a copy would always find the same bytes."""
     kept = []
     monkeypatch.setenv(release.kept_runs.VARIABLE, "")
-    monkeypatch.setattr(release, "make", lambda *_: kept.append(release.kept_runs.cache_folder()) or "0  a\n")
+    monkeypatch.setattr(release, "make", lambda *_, **__: kept.append(release.kept_runs.cache_folder()) or "0  a\n")
     monkeypatch.setattr(release.sys, "argv", ["release", "--twice", "--boards", "ulx3s"])
     assert release.main() == 0
     first, second = kept
