@@ -27,6 +27,7 @@ breathe_default_project = "crunchbot"
 breathe_domain_by_extension = {"h": "c"}
 autodoc_default_options = {"members": True, "undoc-members": True, "show-inheritance": True, "ignore-module-all": True}
 autodoc_member_order = "bysource"
+autodoc_type_aliases = {"ArrayLike": "numpy.typing.ArrayLike"}
 linkcheck_timeout = 20
 # A struct and a function may have one name in C; Sphinx knows one space of names.
 suppress_warnings = ["duplicate_declaration.c"]

@@ -4,6 +4,8 @@ C reads and writes as far as a length says, whatever the array holds. So every a
 the shape that C will assume.
 """
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

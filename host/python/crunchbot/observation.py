@@ -4,6 +4,8 @@ A whisker's column has the whisker's name, "_", and what is read. Names and text
 looked up in the layout of its robot. A name is taken apart only where the robot is not known (`parse`).
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -126,7 +128,7 @@ class Row(Mapping):
     numbers: np.ndarray  # (n,) in the unit of the name; 0 where there is none
 
     @classmethod
-    def of(cls, cells: Mapping[str, float | None], kind: int = EXPLORING) -> "Row":
+    def of(cls, cells: Mapping[str, float | None], kind: int = EXPLORING) -> Row:
         """Makes a row from cells by column; KeyError when time or motion is missing."""
         names = tuple(name for name in cells if name != TIME and name not in ODOMETRY)
         return cls.made(kind, cells[TIME], [cells[name] for name in ODOMETRY], names, [cells[name] for name in names])
@@ -134,7 +136,7 @@ class Row(Mapping):
     @classmethod
     def made(
         cls, kind: int, t_s: float, motion: ArrayLike, names: tuple[str, ...], cells: Iterable[float | None]
-    ) -> "Row":
+    ) -> Row:
         """Makes a row from the cells of these columns in order."""
         cells = list(cells)
         found = [EMPTY if v is None else NOT_READ if math.isnan(v) else VALUE for v in cells]

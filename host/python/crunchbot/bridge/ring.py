@@ -1,5 +1,7 @@
 """The shared ring of frames as NumPy views, read where the frames lie (host/libwhisker/include/whisker/ring.h)."""
 
+from __future__ import annotations
+
 import math
 import pwd
 import threading
@@ -228,7 +230,7 @@ class Reader:
         self._view, self._count = ffi.new("const struct whisker_frame **"), ffi.new("size_t *")
         self._attached()
 
-    def __enter__(self) -> "Reader":
+    def __enter__(self) -> Reader:
         return self
 
     def __exit__(self, *exception) -> None:
@@ -362,7 +364,7 @@ class Writer:
         check(lib.whisker_ring_create(name.encode(), capacity, handle), name)
         self._ring = ffi.gc(handle[0], lib.whisker_ring_close)
 
-    def __enter__(self) -> "Writer":
+    def __enter__(self) -> Writer:
         return self
 
     def __exit__(self, *exception) -> None:

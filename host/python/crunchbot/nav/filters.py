@@ -1,5 +1,7 @@
 """Filters of host/nav on a scene: made, stepped, replayed over many rows, and asked for their belief."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

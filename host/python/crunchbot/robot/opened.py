@@ -5,6 +5,7 @@ for row in run: ...                         # a Row: cells by column
 run.localise("adaptive").poses              # (n, 3)
 run.to_pandas()                             # a row of the robot in each line
 run.show()                                  # in a notebook: the arena, the truth and an estimate
+run.to_rerun("run.rrd")                     # the same and each reading over time, for the viewer of rerun
 """
 
 import math
@@ -91,6 +92,19 @@ class Rows:
         from pandas import DataFrame
 
         return DataFrame(self.columns())
+
+    def to_rerun(self, file: str | Path | None = None, name: str = "") -> None:
+        """Rows, truth where it is known, and a filter's answers, for rerun: into a file.rrd, or a viewer that runs. Needs
+        rerun-sdk."""
+        from .rerun import RerunSink
+
+        run, truth = self.localise(name), self.observations.truth
+        with RerunSink(self.scene, file) as sink:
+            for n, row in enumerate(self):
+                sink.row(row)
+                sink.pose(row.t_s, run.poses[n], run.name, float(run.table["confidence"][n]))
+                if truth is not None and np.isfinite(truth[n]).all():
+                    sink.pose(row.t_s, truth[n], "truth")
 
     def show(self, name: str = "") -> "Plan":
         """The arena with the true path, where it is known, and a filter's; a notebook draws it."""

@@ -1,5 +1,7 @@
 """Observation rows on their way: from cells to messages at the pilot, and from whatever came to filter steps at the desktop."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

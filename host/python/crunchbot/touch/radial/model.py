@@ -1,6 +1,8 @@
 """Radial distance of a contact: the paper's peak and line per whisker (equations 2 and 3), the choice among all models by
 the places left out; calibration recordings and model files."""
 
+from __future__ import annotations
+
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -73,7 +75,7 @@ class RadialModel(Known):
         raise AttributeError(name)
 
     @classmethod
-    def fit(cls, peak_counts: np.ndarray, radius_mm: np.ndarray) -> "RadialModel":
+    def fit(cls, peak_counts: np.ndarray, radius_mm: np.ndarray) -> RadialModel:
         """Least squares over contacts; ValueError when fewer than three are usable or all peaks are equal."""
         peaks = as_doubles(peak_counts, "peak_counts", (None,))
         radii = as_doubles(radius_mm, "radius_mm", peaks.shape)
@@ -97,7 +99,7 @@ class RadialModel(Known):
         return {name: getattr(self, name) for name in FIELDS}
 
     @classmethod
-    def of(cls, fields: Fields) -> "RadialModel":
+    def of(cls, fields: Fields) -> RadialModel:
         """Makes a model from what `content` gave."""
         return cls(fields.number("a1"), fields.number("a0"), *radii_of(fields, "sigma_mm", "low_mm", "high_mm"))
 
@@ -106,7 +108,7 @@ class RadialModel(Known):
         save(self, path)
 
     @classmethod
-    def load(cls, path: str | Path) -> "RadialModel":
+    def load(cls, path: str | Path) -> RadialModel:
         """Read what `save` wrote; TableError with one line when it is something else."""
         model = load(path)
         if not isinstance(model, cls):
@@ -127,7 +129,7 @@ class Whisks:
     direction_deg: np.ndarray | None = None  # of the touch about the shaft, where the file states it
     known_shapes: dict[str, Any] = field(default_factory=dict, repr=False)  # by contact; parts share them
 
-    def part(self, use: ArrayLike) -> "Whisks":
+    def part(self, use: ArrayLike) -> Whisks:
         """Only the contacts of these indices."""
         arrays = (None if a is None else a[use] for a in (self.peak_counts, self.radius_mm))
         directions = None if self.direction_deg is None else self.direction_deg[use]
@@ -208,7 +210,7 @@ class Fitted(NamedTuple):
     """A model with its RMS errors, mm, of contacts predicted by a model fitted without them: without their whole place, and
     without that contact alone; nan where too few remain. tried: the same two errors of every model that was tried."""
 
-    model: "RadialModel | CurveModel | WhiskModel | PressModel"
+    model: RadialModel | CurveModel | WhiskModel | PressModel
     place_mm: float
     contact_mm: float
     tried: dict[str, tuple[float, float]]
@@ -278,7 +280,7 @@ def save(model: Any, path: str | Path) -> None:
     put(path, json.dumps({"format": formats[type(model)]} | node | model.content, indent=1) + "\n")
 
 
-def load(path: str | Path) -> "RadialModel | CurveModel | WhiskModel | PressModel":
+def load(path: str | Path) -> RadialModel | CurveModel | WhiskModel | PressModel:
     """Read what `save` wrote; TableError with one line when it is something else."""
     kinds = {
         FORMAT: RadialModel.of,

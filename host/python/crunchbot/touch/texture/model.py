@@ -1,5 +1,7 @@
 """Floor texture: the stationary naive Bayes classifier (paper, equation 1), recordings, and decisions of any model."""
 
+from __future__ import annotations
+
 import json
 from dataclasses import dataclass
 from itertools import combinations
@@ -47,7 +49,7 @@ class TextureModel:
     @classmethod
     def train(
         cls, recordings: dict[str, list[np.ndarray]], rest: ArrayLike | None = None, bins: int = BINS
-    ) -> "TextureModel":
+    ) -> TextureModel:
         """Learn from raw counts, arrays (n, axes) by class. `rest`: by axis; default the median of all training data."""
         recordings = {name: [_counts(r, "recording") for r in group] for name, group in recordings.items()}
         widths = {r.shape[1] for group in recordings.values() for r in group}
@@ -86,7 +88,7 @@ class TextureModel:
         put(path, json.dumps(content) + "\n")
 
     @classmethod
-    def from_json(cls, path: str | Path, content: object) -> "TextureModel":
+    def from_json(cls, path: str | Path, content: object) -> TextureModel:
         """What `save` wrote, parsed; TableError with one line when it is something else."""
         try:
             return cls._of(Fields(content))
@@ -94,7 +96,7 @@ class TextureModel:
             raise no_model(path, error) from error
 
     @classmethod
-    def _of(cls, fields: Fields) -> "TextureModel":
+    def _of(cls, fields: Fields) -> TextureModel:
         fields.text("format", FORMAT)
         classes = fields.names("classes", lib.NAV_TEXTURE_CLASSES_MAX)
         edges = [fields.array(key, 1) for key in ("rest", "low", "high")]
@@ -108,7 +110,7 @@ class TextureModel:
         return len(self.low)
 
 
-def load(path: str | Path) -> "TextureModel | SpectralModel":
+def load(path: str | Path) -> TextureModel | SpectralModel:
     """A model of either method, as its format says."""
     try:
         content = read_json(path)

@@ -69,6 +69,15 @@ def test_rows_of_a_running_robot_come_until_it_ends(folder):  # noqa: F811
     assert np.allclose(taken.columns()["odo_x_m"], [row.motion[0] for row in rows], atol=1e-6)
 
 
+def test_a_run_goes_into_a_file_of_rerun(folder, tmp_path):  # noqa: F811
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed: pip install 'crunchbot[rerun]'")
+    run, file = crunchbot.open(folder), tmp_path / "run.rrd"
+    run.to_rerun(file, "ekf")
+    printed = subprocess.check_output([sys.executable, "-m", "rerun", "rrd", "print", file], text=True)
+    for entity in ("arena", "ekf/pose", "ekf/path", "ekf/confidence", "truth/pose", "whiskers/"):
+        assert f"/{entity}" in printed
+
+
 @pytest.mark.parametrize(
     ("source", "options", "complaint"),
     [
