@@ -178,7 +178,7 @@ def tell(s: dict) -> None:
     print(
         f"drove: {s['driven_m']:.0f} m, {s['tiles_visited']} of {s['tiles']} tiles, {s['contacts']} contacts, {s['whisks']} whisks measured"
     )
-    print(f"touch: texture {100 * s['texture_accuracy']:.1f} % of windows right")
+    print(f"touch: texture {100 * s['texture_accuracy_all']:.1f} % of windows right")
     for name, f in s["filters"].items():
         text = f"{1000 * f['median_m']:.0f} mm median, {1000 * f['p90_m']:.0f} mm in 90 % of the time"
         print(f"pose:  {name:8} {text}, lost {100 * f['lost_share']:.1f} % of it, {f['losses']} times")

@@ -52,7 +52,7 @@ def _tiles(s: dict) -> str:
         [
             (f"{adaptive['median_m'] * 1000:.0f} mm", "median position error, adaptive", False),
             (percent(adaptive["lost_share"]), "of the time lost, adaptive", adaptive["lost_share"] > 0),
-            (percent(s["texture_accuracy"]), "texture windows right", False),
+            (percent(s["texture_accuracy_all"]), "texture windows right", False),
             (f"{s['driven_m']:.0f} m", f"driven, {s['tiles_visited']} of {s['tiles']} tiles", False),
             (f"{s['simulated_s'] / s['chain_wall_s']:.2f} x", f"of real time, level {s['level']}", False),
         ]

@@ -20,7 +20,12 @@ def fields(result: str) -> dict:
     if result == "usb_soak":
         return data | {"bad": sum(data[key] for key in ("gaps", "duplicates", "wrong", "stale"))}
     if result == "levels":
-        return data | {"gateware": data["rtl, SCK/6, gap 0.5 us"]}
+        hardware = data["rtl, SCK/16, gap 3 us (hardware)"]
+        runs = hardware[1]["runs"]
+        spread = {"runs": len(runs), "low": min(runs), "high": max(runs)}
+        return data | spread | {"hardware": hardware, "gateware": data["rtl, SCK/6, gap 0.5 us"]}
+    if result == "map":
+        return data["families"]
     return data
 
 
@@ -30,10 +35,10 @@ def headlines() -> str:
     for one in HEADLINES:
         found, origin = fields(one["result"]), origins[one["result"]]
         commit = f"{origin['commit']}, stored by {origin['stored_by']}" if "stored_by" in origin else origin["commit"]
-        value, beside = (cell(one[key], found) for key in ("value", "beside"))
+        value, n, beside = (cell(one[key], found) for key in ("value", "n", "beside"))
         made = f"`{COMMAND_OF_RESULT[one['result']]}`"
-        rows.append([one["title"], value, one["unit"], beside, made, commit, origin["machine"]])
-    return table(["figure", "value", "unit", "compared with", "made by", "commit", "machine"], rows)
+        rows.append([one["title"], value, one["unit"], n, beside, made, commit, origin["machine"]])
+    return table(["figure", "value", "unit", "n, how sure", "compared with", "made by", "commit", "machine"], rows)
 
 
 def charts() -> str:
