@@ -96,6 +96,7 @@ def _calibrate(arguments, feed: Feed, names: list[str], node: int | None) -> int
     rests = measure_rest(frames)
     if arguments.overwrite or not (arguments.out / REST).exists():
         write_rest(arguments.out / REST, rests, names)
+    print(_rest_said(rests, names))
     for rest in rests:
         print(_rest_line(rest, names))
     if arguments.lane is None:
@@ -132,6 +133,13 @@ def _ask(arguments, feed: Feed, text: str) -> bool:
     sys.stdin.readline()
     feed.skip()
     return True
+
+
+def _rest_said(rests: list[Rest], names: list[str]) -> str:
+    noisiest = max(rests, key=lambda rest: max(rest.noise), default=None)
+    doubted = [names[rest.lane] for rest in rests if rest.trouble]
+    worst = f"; the most noise: {names[noisiest.lane]}, {max(noisiest.noise):.1f} counts" if noisiest else ""
+    return f"{len(rests)} lanes at rest{worst}" + (f"; look at {', '.join(doubted)}" if doubted else "")
 
 
 def _rest_line(rest: Rest, names: list[str]) -> str:

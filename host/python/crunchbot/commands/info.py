@@ -26,7 +26,7 @@ TEST_ID_TEXT = "{:04x}:{:04x}".format(*usbtree.TEST_ID)
 
 def add(parser: argparse.ArgumentParser) -> None:
     add_ring(parser)
-    parser.add_argument("--json", action="store_true", help="one object on one line")
+    parser.add_argument("--json", action="store_true", help="all that is known, as one object on one line")
     parser.add_argument(
         "--nodes",
         action="store_true",
@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
             raise
         reported["ring"] = {"name": arguments.ring, "state": str(error)}
     reported["advice"] = advice(reported)
-    print(json.dumps(reported) if arguments.json else "\n".join(lines(reported)))
+    print(json.dumps(reported) if arguments.json else "\n".join(spoken(reported)))
     return 0
 
 
@@ -132,14 +132,21 @@ def _is_connected(reported: dict) -> bool:
     return bool(reported.get("daemon", {}).get("connected"))
 
 
-def lines(reported: dict) -> list[str]:
-    """The text for a person: a heading per part, a line per value."""
-    out = []
-    *parts, (_, advised) = reported.items()
-    for part, values in parts:
-        tables = values if isinstance(values, list) else [values]
-        for table in tables:
-            out += [part, *(f"  {key}: {value}" for key, value in table.items())]
-        apart = "; that of the ring is simulated, or in another container" if _is_connected(reported) else ""
-        out += [f"{part}: no bridge is plugged in{apart}"] if not tables else []
-    return out + advised
+def spoken(reported: dict) -> list[str]:
+    """For a person: what is plugged in, whether samples come, who brings them; --json has the rest."""
+    apart = "; that of the ring is simulated, or in another container" if _is_connected(reported) else ""
+    out = [f"usb: bridge {usb['serial']}, {usb['product']}, at {usb['speed_mbit']} Mbit/s" for usb in reported["usb"]]
+    out, ring, daemon = out or [f"usb: no bridge is plugged in{apart}"], reported["ring"], reported.get("daemon")
+    if "state" in ring:
+        return [*out, f"ring {ring['name']}: {ring['state']}", *reported["advice"]]
+    out += [
+        f"ring {ring['name']}: {ring['published']} frames written by process {ring['writer_pid']} of {ring['owner']}"
+    ]
+    if daemon:
+        bad = sum(daemon[f"records_{kind}"] for kind in ("crc", "tick", "usb", "sensor"))
+        lanes = ", ".join(map(str, daemon["lanes"])) or "none"
+        lost = f"{daemon['frames_missing'] or 'no'} frames lost, {bad or 'no'} records bad"
+        known = f"gateware {daemon['gateware']}, wire version {daemon['wire_version']}"
+        state = f"connected ({known}), lanes {lanes}" if daemon["connected"] else "not connected"
+        out += [f"bridge {daemon['serial'] or 'without a serial number'}: {state}; {lost} in {daemon['up_s']:.0f} s"]
+    return out + reported["advice"]

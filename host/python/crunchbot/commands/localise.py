@@ -21,9 +21,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     vars(named)["values"] = localise.filter_names()  # for a shell's completion
     parser.add_argument("--seed", type=int, default=0, help="of every random draw")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="change a setting, see --list-settings"
-    )
+    text = "change a setting, see --list-settings"
+    setting = parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=text)
+    vars(setting)["values"] = [f"{name}=" for name, *_ in localise.settings_list()]
     add_output(parser, "--out", metavar="EST.CSV", help="write t_s, x_m, y_m, theta_rad, confidence of every row")
     text = "occupancy map (a ROS map server's YAML file): its boxes in place of arena.toml's, or of all of it where there is none"
     parser.add_argument("--map", metavar="MAP.YAML", help=text)

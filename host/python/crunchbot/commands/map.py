@@ -27,5 +27,5 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"whisker: warning: {arguments.scene}/{OBSERVATIONS}: {fault}", file=sys.stderr)
     mapped = mapping.run(robot, textures, rows, not arguments.no_lattice, arguments.json)
     reported = mapping.summary(mapped, mapping.write_map(arguments.out, mapped, arguments.overwrite))
-    print(json.dumps(reported) if arguments.json else "\n".join(f"{key}: {value}" for key, value in reported.items()))
+    print(json.dumps(reported) if arguments.json else "\n".join(mapping.spoken(reported)))
     return 0

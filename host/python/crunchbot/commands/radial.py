@@ -25,6 +25,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     p.add_argument("contacts", help="CSV: contact, radius_mm, t_s, channels; where known " + COLUMNS)
     add_output(p, "--out", required=True, metavar="MODEL.JSON")
     p.add_argument("--model", choices=radial.MODELS, default="default", help=KINDS)
+    p.add_argument("--json", action="store_true", help="the errors as one object on one line")
     example = "whisker radial predict examples/radial.json examples/contacts.csv --json"
     p = add_action(actions, "predict", "estimate the radius of each contact", example, predict)
     p.add_argument("model")
@@ -46,6 +47,14 @@ def fit(arguments: argparse.Namespace) -> int:
         radial.save(found.model, arguments.out)
     except ValueError as error:
         raise TableError(arguments.contacts, None, str(error)) from error
+    if arguments.json:
+        tried = {
+            name: dict(zip(("place_mm", "contact_mm"), errors, strict=True)) for name, errors in found.tried.items()
+        }
+        print(json.dumps({"contacts": len(whisks.contact), "place_mm": found.place_mm, "tried": tried}))
+        return 0
+    paper = found.tried.get("linear", (found.place_mm,))[0]
+    print(f"a place that was left out is found to {found.place_mm:.2f} mm RMS; by the paper's line to {paper:.2f} mm")
     print("model      places left out  contacts left out  (RMS error, mm)")
     for name, errors in found.tried.items():
         mark = "  chosen" if errors == (found.place_mm, found.contact_mm) else ""

@@ -157,7 +157,13 @@ def rows(answers: dict[str, Counter], columns: list[str]) -> list[str]:
 
 def table(answers: dict[str, Counter], columns: list[str]) -> list[str]:
     width, cell = max(map(len, [*answers, "surface"])), max(8, *(len(c) + 2 for c in columns))
-    lines = [f"{'surface':{width}}{'windows':>9}" + "".join(f"{c:>{cell}}" for c in columns)]
+    right, total = sum(found[name] for name, found in answers.items()), sum(found.total() for found in answers.values())
+    worst = min(answers, key=lambda name: answers[name][name] / max(1, answers[name].total()))
+    taken = answers[worst].most_common(2)
+    mostly = next((f", else mostly {label}" for label, _ in taken if label != worst), "")
+    share = 100 * answers[worst][worst] / max(1, answers[worst].total())
+    lines = [f"{100 * right / max(1, total):.1f} % of {total} windows right; least {worst}, {share:.1f} %{mostly}"]
+    lines += [f"{'surface':{width}}{'windows':>9}" + "".join(f"{c:>{cell}}" for c in columns)]
     for name, found in answers.items():
         shares = [100 * found[c] / max(1, found.total()) for c in columns]
         lines.append(f"{name:{width}}{found.total():9}" + "".join(f"{s:{cell - 2}.1f} %" for s in shares))

@@ -217,4 +217,20 @@ def summary(mapped: Mapped, made: MapScene) -> dict:
         "lost_s": [round(float(mapped.rows.t_s[part.noticed]), 3) for part in mapped.parts[1:]],
         "bad_cells": mapped.bad_cells,
         "bad_rows": mapped.bad_rows,
+        "regions_hold": False,  # with odometry as in the families `raw` and `noisy`: docs/results/map.md
     }
+
+
+def spoken(reported: dict) -> list[str]:
+    """What `whisker map` prints without --json: a summary's lines for a person."""
+    wide, high = reported["size_m"]
+    tiles = f"{reported['tiles']} tiles of {reported['tile_m']:.2f} m" if reported["tile_m"] else "no lattice of tiles"
+    lines = [f"{reported['steps']} rows: {reported['faces']} faces and {tiles} in {wide:g} m x {high:g} m"]
+    if reported["confidence"] is not None:
+        said = f"confidence at the end: {reported['confidence']:.2f}"
+        lines += [f"{said}; with poor odometry the 90 % regions do not hold: docs/results/map.md"]
+    if reported["lost_s"]:
+        when = ", ".join(f"{at:.1f} s" for at in reported["lost_s"])
+        lines += [f"carried off at {when}: {reported['parts']} parts, of which the last is written"]
+    bad = reported["bad_rows"], reported["bad_cells"]
+    return lines + ([f"not used: {bad[0]} rows, {bad[1]} cells"] if any(bad) else [])

@@ -94,7 +94,10 @@ def test_info_reports_ring_daemon_and_clock(capsys):
         assert reported["daemon"]["serial"] == "B0042" and reported["daemon"]["lanes"] == [0, 2]
         assert reported["clock"]["uncertainty_ns"] == 5000.0 and reported["host"]["wire_version"] == WIRE_VERSION
         assert reported["host"]["version"] == __version__ and reported["advice"] == []
-        assert "  serial: B0042" in run(capsys, "info", "--ring", name)[1]
+        said = run(capsys, "info", "--ring", name)[1].splitlines()
+        assert said[1].startswith(f"ring {name}: 300 frames written by process {os.getpid()} of ")
+        assert said[2].startswith("bridge B0042: connected (") and "lanes 0, 2; no frames lost, " in said[2]
+        assert len(said) == 3, "one or two sentences, and what is plugged in"
 
 
 @pytest.mark.parametrize(
