@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import nearest
 from ..errors import UserError
 from ..native import as_doubles, doubles, ffi, lib, octets, pointer
 from ..observation import Row
@@ -139,7 +140,8 @@ class Filter:
         """`components`: (n,) of COMPONENT, to begin from in place of the scene's prior; `sensors`: more than the scene's;
         `normals`: rows may carry directions of the surfaces that object whiskers touch."""
         if name not in filter_names():
-            raise SettingError(f"filter '{name}' is unknown; choose one of {', '.join(filter_names())}")
+            near = nearest(name, filter_names())
+            raise SettingError(f"filter '{name}' is unknown{near}; choose one of {', '.join(filter_names())}")
         if not 0 <= seed <= SEED_MOST:
             raise SettingError(f"--seed {seed}: outside 0 to 2^64 - 1; choose a number inside")
         self.scene = scene
@@ -374,7 +376,8 @@ def problem_of(
 def _set(problem, key: str, value: float) -> None:
     known = {name: (low, high) for name, _, low, high in settings_list()}
     if key not in known:
-        raise SettingError(f"--set {key}: no such setting; the names are {', '.join(known)}")
+        near = nearest(key, list(known)) or "; see whisker localise --list-settings"
+        raise SettingError(f"--set {key}: no such setting{near}")
     if lib.nav_settings_set(ffi.addressof(problem.settings), key.encode(), value) != 0:
         low, high = known[key]
         raise SettingError(f"--set {key}={value:g}: outside {low:g} to {high:g}; choose a value inside")

@@ -195,7 +195,7 @@ class McapFile:
     def _open(self) -> None:
         if not self._is_mcap():
             is_pointer = self._salvage.read(0, len(LFS)) == LFS
-            remedy = "fetch it by 'git lfs pull'" if is_pointer else "give a recording made by 'whisker record'"
+            remedy = "fetch it by 'git lfs pull'" if is_pointer else "give a file of 'whisker record' or 'whisker bag'"
             raise RecordingError(f"{self.path}: not an MCAP file{' but its Git LFS pointer' * is_pointer}; {remedy}")
         for found in self._salvage.records(unpack=False):
             if found.opcode in PARSED - {Opcode.MESSAGE}:

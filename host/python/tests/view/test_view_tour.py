@@ -70,3 +70,20 @@ def test_the_tour_goes_from_mark_to_mark_there_and_back():
             assert b.troubles == []
 
     asyncio.run(walk())
+
+
+def test_the_minute_plays_with_what_the_extra_view_installs():
+    """The network, Pyro, scene folders and pandas are others' extras."""
+    program = """
+import sys
+for name in ("zenoh", "Pyro5", "yaml", "PIL", "tomli_w", "tqdm", "pandas"):
+    sys.modules[name] = None
+import importlib
+from importlib.resources import as_file, files
+tried = importlib.import_module("crunchbot.commands.try")
+from crunchbot.view.command import WANTED, read_bag
+with as_file(files("crunchbot") / tried.BAG) as bag:
+    print(len(read_bag(bag, [topic.removesuffix("/*") for topic in WANTED]).said) > 100)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout == "True\n", done.stderr

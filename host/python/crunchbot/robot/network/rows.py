@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,10 +14,12 @@ from numpy.typing import ArrayLike
 from ...observation import CARRIED, NOT_READ, RELEASE, Row, cell
 from ...pilot.pilot import compose
 from .inbox import Received
-from .link import Link
 from .messages import Header, Observation
 from .ros import BASE_FRAME
 from .streams import Envelope
+
+if TYPE_CHECKING:
+    from .link import Link  # needs the network, which who reads a bag does without
 
 ROW_NS = 10**8  # the paper's 0.1 s
 # A filter takes up to 1 m and half a turn in one row (host/nav/measurement/intake.c); longer motions come in such pieces.

@@ -26,6 +26,9 @@ def check_port(host: str, port: int, option: str) -> None:
         try:
             probe.bind((host, port))
             probe.listen()
+        except socket.gaierror as error:
+            text = f"robot: {host}: {error.strerror}; give an address of this machine, as 127.0.0.1"
+            raise HeldError(text) from None
         except OSError as error:
             who = _reported(_holders(_sockets_at(port)))
             raise HeldError(
