@@ -58,7 +58,7 @@ release: build sbom ## what users download, into dist/: wheels, Debian packages,
 	@$(PYTHON) tools/release $(if $(BOARDS),--boards $(BOARDS)) $(if $(USB_ID),--usb-id "$(USB_ID)")
 
 release-offline: ## each remedy that names a package, against the files of dist/ alone: make release, or make wheels, before
-	@WHISKER_DIST=dist $(PYTHON) -m pytest --quiet tests/repository/test_offline.py
+	@WHISKER_DIST=dist $(PYTHON) -m pytest --quiet tests/repository/test_remedies.py
 
 release-check: build sbom ## make a release twice and compare every byte; [BOARDS="a b"]
 	@$(PYTHON) tools/release --twice $(if $(BOARDS),--boards $(BOARDS)) $(if $(USB_ID),--usb-id "$(USB_ID)")

@@ -40,7 +40,7 @@ if [ "${1:-}" = --long ]; then
     fi
     echo "test: remedies that name a package, against the wheels alone"
     .venv/bin/python tools/wheels
-    WHISKER_DIST=dist .venv/bin/python -m pytest --quiet tests/repository/test_offline.py
+    WHISKER_DIST=dist .venv/bin/python -m pytest --quiet tests/repository/test_remedies.py
     echo "test: mutated recordings"
     .venv/bin/python host/python/tests/fuzz.py recording --inputs 300000
     echo "test: a Linux kernel and the simulated bridge"
