@@ -21,6 +21,7 @@ html_title = "CrunchBot"
 html_copy_source = False
 smartquotes = False  # options have two dashes
 myst_heading_anchors = 6
+highlight_language = "text"  # of code that names none: commands, pictures
 myst_enable_extensions = ["deflist"]
 breathe_projects = {"crunchbot": os.environ["HANDBOOK_XML"]}
 breathe_default_project = "crunchbot"
