@@ -7,12 +7,14 @@
 #define FRAME_MS CREATE_OI_PERIOD_MS
 
 static struct create_motion motion;
+static bool carried; /* as the newest frame was passed on */
 static uint8_t orders[4096]; /* written since the last look */
 static size_t order_count;
 
 static void on_step(void *context, const struct create_step *step, unsigned bits)
 {
     base_clients_step(context, step, bits);
+    carried = bits & BASE_CARRIED;
     create_motion_add(&motion, step);
 }
 
@@ -85,6 +87,23 @@ static void what_it_said_on_another_connection_does_not_count(void **state)
     assert_kept(OPENED_MS + 60);
     assert_int_equal(base_robot_bits(&robot), BASE_IDLE);
     assert_non_null(strstr(health(OPENED_MS + 60), " mode=unknown "));
+}
+
+/* Nobody knows whether it was moved meanwhile, unless it has encoders. */
+static void a_base_that_was_not_heard_for_a_while_may_have_been_carried(void **state)
+{
+    (void)state;
+    const int64_t heard_ms = OPENED_MS + FRAME_MS, silent_ms = heard_ms + BASE_SILENCE_MS;
+    for (int encoders = 0; encoders < 2; encoders++) {
+        robot.odometry.started = encoders;
+        report_frame(0, 0, heard_ms + encoders * (BASE_SILENCE_MS + 2 * FRAME_MS));
+        assert_false(carried);
+        base_robot_watch(&robot, silent_ms + encoders * (BASE_SILENCE_MS + 3 * FRAME_MS));
+        report(CREATE_OI_MODE_PASSIVE, 0, 0, robot.opened_ms + FRAME_MS);
+        assert_int_equal(carried, !encoders);
+        report_frame(0, 0, robot.opened_ms + 2 * FRAME_MS);
+        assert_false(carried);
+    }
 }
 
 /* It goes on to send what an earlier request asked for: it does not hear this one. */
@@ -358,6 +377,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         UNHEARD(a_base_that_was_never_heard_on_this_connection_stands),
         HEARD(what_it_said_on_another_connection_does_not_count),
+        HEARD(a_base_that_was_not_heard_for_a_while_may_have_been_carried),
         HEARD(frames_of_an_earlier_request_are_no_answer),
         HEARD(a_base_that_is_not_heard_for_half_a_second_stands),
         HEARD(what_has_waited_to_be_read_is_old),

@@ -39,7 +39,7 @@ enum {
     BASE_CLIFF_FRONT_RIGHT = 1 << 7,
     BASE_CLIFF_RIGHT = 1 << 8,
     BASE_IDLE = 1 << 9,    /* wheels will not turn: the base is not in its mode, not heard, not connected, or held */
-    BASE_CARRIED = 1 << 10 /* both wheels hang, or it said what no wheel can have done: carried, or a wrong frame */
+    BASE_CARRIED = 1 << 10 /* both wheels hang, it was not heard and does not count, or what it says no wheel does */
 };
 
 /* How far the base is with the mode it is asked for. From every mode the way leads through passive, where nothing can
@@ -95,6 +95,7 @@ struct base_robot {
     bool left;              /* it left the mode by itself, and nobody has asked for one since */
     int32_t mode_offset;    /* some firmwares report a mode one higher than it is */
     bool low, reported_low; /* battery */
+    bool unseen;            /* it was not heard for a while: it may have been moved */
     bool silent;            /* it was heard, and then no more: until a frame comes the wheels stay stopped */
     unsigned held;          /* bits of enum base_hold: while one is set the wheels stay stopped */
     int64_t drive_ms, opened_ms;

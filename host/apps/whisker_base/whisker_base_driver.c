@@ -201,6 +201,7 @@ static bool whisker_base_driver_open_first(struct driver *driver)
     const struct base_driver_start *start = &driver->start;
     driver->tried_ms = cli_now_ms();
     driver->opened = base_robot_open(&driver->robot, start->port, cli_now_ms());
+    driver->robot.unseen = start->restarts > 0;
     if (!driver->opened && !start->options->wait && start->restarts == 0) {
         return false;
     }

@@ -78,6 +78,7 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
     robot->error = 0;
     robot->sent = 0;
     robot->silent = false;
+    robot->unseen = robot->frame_ms > 0;
     robot->low_brc = -1;
     robot->requests += robot->options->stream_clock ? 0 : (unsigned)now_ms; /* a driver before had orders of its own */
     robot->emptied_ms = now_ms;
@@ -178,10 +179,13 @@ static void whisker_base_robot_log_carried(struct base_robot *robot)
 static void whisker_base_robot_step(struct base_robot *robot)
 {
     const uint64_t carried = robot->odometry.carried;
+    const bool counted = robot->odometry.started; /* by encoders, also while nobody heard it */
     const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
     const bool more = robot->odometry.carried > carried;
     const unsigned bits = base_robot_bits(robot), lifted = CREATE_OI_DROP_LEFT | CREATE_OI_DROP_RIGHT;
-    robot->on_step(robot->context, &step, bits | (more || (bits & lifted) == lifted ? BASE_CARRIED : 0u));
+    const bool moved = more || (robot->unseen && !counted) || (bits & lifted) == lifted;
+    robot->unseen = false;
+    robot->on_step(robot->context, &step, bits | (moved ? BASE_CARRIED : 0u));
     if (more) {
         whisker_base_robot_log_carried(robot);
     }
@@ -347,6 +351,7 @@ static void whisker_base_robot_log_silence(struct base_robot *robot, const struc
 static void whisker_base_robot_restart_stream(struct base_robot *robot, int64_t now_ms)
 {
     robot->silences++;
+    robot->unseen |= robot->frame_ms > 0;
     robot->silent = true;
     robot->phase_frames = 0;
     const struct base_unframed unframed = robot->unframed;

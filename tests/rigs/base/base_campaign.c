@@ -50,7 +50,9 @@
 #define AGREE_MS 170
 #define BELIEVED_MS (BASE_SILENCE_MS + AGREE_MS)
 #define CHI2_90 6.251388631170325 /* of 3 degrees of freedom */
-#define CHI2_NEVER 150.0          /* 12 sigma: no disturbance of the line or of the wheels makes so much */
+#define NEVER 8.0 /* sigma of place or heading: no disturbance of the line or of the wheels makes so much */
+#define GRAIN_M 5e-3 /* of the judgement; about a degree */
+#define GRAIN_RAD 0.02
 #define FAR_M 1.0                 /* nor has a lie that wheels can have done ever led so far in a leg */
 #define HANDED_MS 500             /* within which a new commander has the driver's own mode */
 #define RESOLUTION 1e-3           /* m, rad: of the comparison; what is of second order in the errors is less */
@@ -746,6 +748,19 @@ static double chi2(void)
     return sum;
 }
 
+/* Place and heading each by themselves: large errors of both bend what the covariance has as straight. */
+static void judge_odometry(void)
+{
+    double c[3][3];
+    create_motion_covariance(&seen_motion, c);
+    const double far_m = hypot(seen_motion.x - true_x, seen_motion.y - true_y);
+    const double place = far_m / sqrt(c[0][0] + c[1][1] + GRAIN_M * GRAIN_M);
+    const double heading = fabs(seen_motion.theta - true_theta) / sqrt(c[2][2] + GRAIN_RAD * GRAIN_RAD);
+    if (measurable && !reported && (lied_ms > leg_from_ms ? far_m > FAR_M : fmax(place, heading) > NEVER)) {
+        blame("the odometry is off by %.1f and %.1f sigma, %.2f m, and nothing says so", place, heading, far_m);
+    }
+}
+
 /* Measures the odometry of a leg, where its beginning and its end are standing and heard. */
 static void measure(void)
 {
@@ -761,10 +776,7 @@ static void measure(void)
     }
     const double off = chi2();
     const int model = options.odometry.model == CREATE_2;
-    const double far_m = hypot(seen_motion.x - true_x, seen_motion.y - true_y);
-    if (measurable && !reported && (lied_ms > leg_from_ms ? far_m > FAR_M : off > CHI2_NEVER)) {
-        blame("the odometry is off by %.1f sigma, %.2f m, and nothing says so", sqrt(off), far_m);
-    }
+    judge_odometry();
     leg_from_ms = now_ms;
     if (measurable && disturbed) {
         measured[model]++;
