@@ -7,7 +7,7 @@
 #define FRAME_MS CREATE_OI_PERIOD_MS
 
 static struct create_motion motion;
-static bool carried; /* as the newest frame was passed on */
+static bool carried;         /* as the newest frame was passed on */
 static uint8_t orders[4096]; /* written since the last look */
 static size_t order_count;
 

@@ -50,12 +50,12 @@
 #define AGREE_MS 170
 #define BELIEVED_MS (BASE_SILENCE_MS + AGREE_MS)
 #define CHI2_90 6.251388631170325 /* of 3 degrees of freedom */
-#define NEVER 8.0 /* sigma of place or heading: no disturbance of the line or of the wheels makes so much */
+#define NEVER 8.0    /* sigma of place or heading: no disturbance of the line or of the wheels makes so much */
 #define GRAIN_M 5e-3 /* of the judgement; about a degree */
 #define GRAIN_RAD 0.02
-#define FAR_M 1.0                 /* nor has a lie that wheels can have done ever led so far in a leg */
-#define HANDED_MS 500             /* within which a new commander has the driver's own mode */
-#define RESOLUTION 1e-3           /* m, rad: of the comparison; what is of second order in the errors is less */
+#define FAR_M 1.0       /* nor has a lie that wheels can have done ever led so far in a leg */
+#define HANDED_MS 500   /* within which a new commander has the driver's own mode */
+#define RESOLUTION 1e-3 /* m, rad: of the comparison; what is of second order in the errors is less */
 /* Of regions of 90 %, over at least ENOUGH disturbances. */
 #define COVER_LEAST 0.85
 #define COVER_MOST 0.97
