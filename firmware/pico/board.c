@@ -20,7 +20,6 @@ static const uint8_t PIN_SCK[BOARD_BUSES] = {2, 10}, PIN_MOSI[BOARD_BUSES] = {3,
 
 static void board_pll(uint32_t pll, uint32_t feedback, uint32_t post)
 {
-    REG(pll + PLL_CS) = 1; /* of the crystal itself */
     REG(pll + PLL_FBDIV) = feedback;
     CLEAR(pll + PLL_PWR) = PLL_POWER;
     while (!(REG(pll + PLL_CS) & READY)) {

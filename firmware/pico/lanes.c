@@ -5,8 +5,8 @@
 
 #define BAD_MAX 200u /* failed readings in a row, 0.1 s, after which the sensor is looked for anew */
 /* A field below 5 mT is that of a magnet lost or far off: 100 times the Earth's; noise of 0.1 mT then turns it by more
- * than a degree. In the sensors' units: 50 mT / 32768 and 3.16 uT. */
-#define WEAK_TMAG5170 3277u
+ * than a degree. In the sensors' units: 100 mT / 32768 and 3.16 uT. */
+#define WEAK_TMAG5170 1638u
 #define WEAK_MLX90393 1582u
 #define STOP 0x7FF0 /* the largest value of 12 bits; a field beyond the range sits there */
 

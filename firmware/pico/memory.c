@@ -5,9 +5,6 @@
 void *memset(void *to, int value, size_t n)
 {
     uint8_t *at = to;
-    if (((uintptr_t)to & 3u) == 0)
-        for (; n >= 4; n -= 4, at += 4)
-            *(uint32_t *)(void *)at = 0x01010101u * (uint8_t)value;
     while (n-- > 0)
         *at++ = (uint8_t)value;
     return to;

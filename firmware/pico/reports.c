@@ -48,28 +48,20 @@ static void reports_identity(uint8_t *bytes)
 
 static bool reports_value(uint32_t lane, uint16_t *alpha, uint16_t *beta)
 {
-    *beta = 0;
-    if (shown.command != WHISKER_SERVICE_COMMAND_INFO || lane >= BOARD_LANES || !lanes_present(lane))
+    static const uint16_t SAID[][2] = {
+        [WHISKER_INFO_CHIP] = {CHIP, 0},
+        [WHISKER_INFO_FIRMWARE] = {FIRMWARE_VERSION, BUILD_OPTIONS},
+        [WHISKER_INFO_WIRE] = {WHISKER_WIRE_VERSION, 0},
+        [WHISKER_INFO_SERIAL] = {UINT16_MAX, UINT16_MAX},
+    };
+    const uint32_t counter = shown.item - WHISKER_INFO_HEALTH;
+    const bool said = shown.item < sizeof SAID / sizeof SAID[0];
+    if (shown.command != WHISKER_SERVICE_COMMAND_INFO || lane >= BOARD_LANES || !lanes_present(lane) ||
+        (!said && counter >= WHISKER_HEALTH_COUNT))
         return false;
-    switch (shown.item) {
-    case WHISKER_INFO_CHIP:
-        *alpha = CHIP;
-        return true;
-    case WHISKER_INFO_FIRMWARE:
-        *alpha = FIRMWARE_VERSION;
-        *beta = BUILD_OPTIONS;
-        return true;
-    case WHISKER_INFO_WIRE:
-        *alpha = WHISKER_WIRE_VERSION;
-        return true;
-    case WHISKER_INFO_SERIAL:
-        *alpha = *beta = UINT16_MAX;
-        return true;
-    default:
-        *beta = (uint16_t)(shown.item - WHISKER_INFO_HEALTH);
-        *alpha = *beta < WHISKER_HEALTH_COUNT ? lanes_health(lane, *beta) : 0;
-        return *beta < WHISKER_HEALTH_COUNT;
-    }
+    *alpha = said ? SAID[shown.item][0] : lanes_health(lane, counter);
+    *beta = said ? SAID[shown.item][1] : (uint16_t)counter;
+    return true;
 }
 
 static void reports_answers(uint8_t *bytes)
@@ -81,8 +73,6 @@ static void reports_answers(uint8_t *bytes)
         uint32_t status = WHISKER_CODE_ABSENT << WHISKER_STATUS_CODE_SHIFT;
         if (reports_value(lane, &alpha, &beta))
             status = WHISKER_CODE_ANSWER << WHISKER_STATUS_CODE_SHIFT | shown.command;
-        else
-            alpha = beta = 0;
         whisker_put_u16(at, alpha);
         whisker_put_u16(at + 2, beta);
         whisker_put_u16(at + 4, (uint16_t)status);

@@ -98,8 +98,6 @@
 #define SYST_ON 7u /* of the processor's clock, with its exception */
 #define NVIC_ENABLE UINT32_C(0xE000E100)
 #define NVIC_PRIORITY(irq) (UINT32_C(0xE000E400) + ((irq) & ~3u))
-#define ICSR UINT32_C(0xE000ED04)
-#define ICSR_SYSTICK_CLEAR (1u << 25)
 #define VTOR UINT32_C(0xE000ED08)
 #define IRQ_TIMER0 0u
 #define IRQ_USB 5u

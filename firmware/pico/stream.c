@@ -6,9 +6,9 @@
 #include "rp2040.h"
 
 #define FIFO_FRAMES (WHISKER_LIMIT_FIFO_BYTES / WHISKER_FRAME_BYTES)
-#define PERIOD_MIN 24000u              /* 400 us: conversion and reading of 16 lanes */
+#define PERIOD_MIN 27000u              /* 450 us: conversion and reading of 16 lanes */
 #define PERIOD_MAX (UINT32_C(1) << 23) /* of the processor's 24-bit timer, twice as fast */
-#define CONVERSION_US 150u   /* from the pulse until three axes of a TMAG5170 are there (100), and a slow one's */
+#define CONVERSION_US 200u   /* from the pulse until three axes of a TMAG5170 are there (175), and a slow one's */
 #define READING_US 250u      /* before the next tick, where a sensor needs most of the tick */
 #define SOF_AGE_MAX_US 1090u /* as the protocol says of usb_time */
 #define SOF_KNOWN 0x8000u
@@ -41,8 +41,6 @@ static void stream_set_period(uint32_t cycles)
     period = cycles;
     REG(SYST_RVR) = 2u * cycles - 1u;
     REG(SYST_CVR) = 0;
-    REG(ICSR) = ICSR_SYSTICK_CLEAR;
-    REG(SYST_CSR) = SYST_ON;
 }
 
 void stream_start(void (*frames_are_there)(void))
@@ -54,6 +52,7 @@ void stream_start(void (*frames_are_there)(void))
     whisker_put_u32(control + WHISKER_REPORT_CONTROL_LANE_MASK, (1u << BOARD_LANES) - 1u);
     whisker_put_u32(control + WHISKER_REPORT_CONTROL_TICK_PERIOD, WHISKER_LIMIT_TICK_PERIOD);
     stream_set_period(WHISKER_LIMIT_TICK_PERIOD);
+    REG(SYST_CSR) = SYST_ON;
 }
 
 static bool stream_is_right(const uint8_t *r)
@@ -72,8 +71,8 @@ static bool stream_is_right(const uint8_t *r)
 
 static void stream_begin(void)
 {
-    REG(SYST_CSR) = 0;                      /* no tick comes between these */
-    REG(TIMER_ARMED) = REG(TIMER_INTR) = 1; /* nor the reading of one before the run */
+    __asm volatile("cpsid i" : : : "memory"); /* no tick comes between these */
+    REG(TIMER_ARMED) = REG(TIMER_INTR) = 1;   /* nor the reading of one before the run */
     run++;
     tick = UINT32_MAX;
     now_cycles = UINT64_C(0) - whisker_get_u32(control + WHISKER_REPORT_CONTROL_TICK_PERIOD);
@@ -82,6 +81,7 @@ static void stream_begin(void)
     ending = false;
     running = true;
     stream_set_period(whisker_get_u32(control + WHISKER_REPORT_CONTROL_TICK_PERIOD));
+    __asm volatile("cpsie i" : : : "memory");
 }
 
 bool stream_control(const uint8_t *report)

@@ -1,5 +1,7 @@
 #include "tmag5170.h"
 
+#include <stddef.h>
+
 #include "whisker_protocol.h" // WHISKER_CODE_*
 
 #define DEVICE_CONFIG 0x0u
@@ -7,29 +9,35 @@
 #define SYSTEM_CONFIG 0x2u
 #define X_RESULT 0x9u
 #define TEST_CONFIG 0xFu
-#define ACTIVE_TRIGGER 0x0030u /* DEVICE_CONFIG: a conversion when asked, no average */
-#define ALL_AXES 0x01C0u       /* SENSOR_CONFIG: X, Y, Z, each of the default range: 50 mT, or 150 of version 2 */
+#define ACTIVE_TRIGGER 0x1030u /* DEVICE_CONFIG: a conversion when asked, of two samples an axis: 175 us */
+#define ALL_AXES 0x01EAu       /* SENSOR_CONFIG: X, Y, Z, each of the range 100 mT, or 300 of version 2 */
 #define TRIGGER_ALERT 0x0400u  /* SYSTEM_CONFIG: by the pin */
 #define TYPE_XY (1u << 6)      /* . frames of two axes; 0: of registers */
 #define TYPE_ZY (3u << 6)
 #define READ 0x80000000u
-#define SETS_MASK 7u /* of a frame's status: conversions, modulo 8 */
-#define TRIES 8u     /* conversions compared before plain reads are taken */
+#define STATUS_OF_PLAIN 4u /* its lowest bit in a frame of a register */
+#define SETS_MASK 7u       /* of a frame's status: conversions, modulo 8 */
+#define SETS_NONE UINT8_MAX
+#define TRIES 8u /* conversions compared before plain reads are taken */
 #define AXES 3u
 
 enum step { FIND, CONFIGURE, COMPARE };
 
-/* Bits of a nibble's place: of the first channel's three, of the second's three, of the status. Then whether the CRC's
- * last bit is inverted. */
+/* Bits of a nibble's place: of the first channel's three, of the second's three, of the status. Whether the CRC's last
+ * bit is inverted. Bits that are the same in both frames of a reading: Y, and the number of the conversion. */
 struct layout {
     uint8_t shift[6], status, inverted;
+    uint32_t same;
 };
+#define LAYOUT(a, b, c, d, e, f, status, inverted)                                                                     \
+    {                                                                                                                  \
+        {a, b, c, d, e, f}, status, inverted, 0xFu << d | 0xFu << e | 0xFu << f | SETS_MASK << status                  \
+    }
 static const struct layout LAYOUTS[] = {
-    {{16, 12, 4, 24, 20, 8}, 28, 0},                                  /* the maker's code */
-    {{16, 12, 4, 24, 20, 8}, 28, 1},                                  /* and a CRC as TI E2E 1199728 saw it */
-    {{24, 20, 16, 12, 8, 4}, 28, 0},                                  /* one axis behind the other */
-    {{24, 20, 16, 12, 8, 4}, 28, 1}, {{20, 16, 8, 28, 24, 12}, 4, 0}, /* the data sheet of 2021: status last */
-    {{20, 16, 8, 28, 24, 12}, 4, 1},
+    LAYOUT(16, 12, 4, 24, 20, 8, 28, 0),                                      /* the maker's code */
+    LAYOUT(16, 12, 4, 24, 20, 8, 28, 1),                                      /* and a CRC as TI E2E 1199728 saw it */
+    LAYOUT(24, 20, 16, 12, 8, 4, 28, 0), LAYOUT(24, 20, 16, 12, 8, 4, 28, 1), /* one axis behind the other */
+    LAYOUT(20, 16, 8, 28, 24, 12, 4, 0), LAYOUT(20, 16, 8, 28, 24, 12, 4, 1), /* the data sheet of 2021: status last */
 };
 #define LAYOUT_COUNT (sizeof LAYOUTS / sizeof LAYOUTS[0])
 #define LAYOUT_PLAIN LAYOUT_COUNT
@@ -142,7 +150,7 @@ bool tmag5170_step(struct sensor *sensor, uint8_t lane)
         (void)tmag5170_frame(lane, plain); /* an answer means something once it is of registers */
         sensor->code = tmag5170_judge(tmag5170_frame(lane, tmag5170_ask(TEST_CONFIG)), 0);
         sensor->tries = 0;
-        sensor->sets = UINT8_MAX; /* none */
+        sensor->sets = SETS_NONE;
         sensor->step = CONFIGURE;
         return sensor->code == WHISKER_CODE_OK;
     case CONFIGURE:
@@ -158,20 +166,26 @@ bool tmag5170_step(struct sensor *sensor, uint8_t lane)
 
 static void tmag5170_take_one(struct sensor *sensor, struct sensor_result *result, const uint32_t words[AXES])
 {
-    const bool plain = sensor->layout == LAYOUT_PLAIN;
-    const struct layout *layout = &LAYOUTS[plain ? 0 : sensor->layout];
+    const struct layout *pair = sensor->layout == LAYOUT_PLAIN ? NULL : &LAYOUTS[sensor->layout];
+    const uint32_t status = pair ? pair->status : STATUS_OF_PLAIN;
+    const uint8_t before = sensor->sets;
+    sensor->sets = SETS_NONE; /* after a damaged reading the next one's number says nothing */
     result->code = WHISKER_CODE_OK;
-    for (uint32_t i = 0; i < (plain ? AXES : 2u) && result->code == WHISKER_CODE_OK; i++)
-        result->code = tmag5170_judge(words[i], plain ? 0 : layout->inverted);
+    for (uint32_t i = 0; i < (pair ? 2u : AXES) && result->code == WHISKER_CODE_OK; i++)
+        result->code = tmag5170_judge(words[i], pair ? pair->inverted : 0);
+    /* Four bits of CRC alone let one damaged frame in 16 through. */
+    if (result->code == WHISKER_CODE_OK &&
+        (pair ? (words[0] ^ words[1]) & pair->same
+              : ((words[0] ^ words[1]) | (words[0] ^ words[2])) >> status & SETS_MASK) != 0)
+        result->code = WHISKER_CODE_SENSOR_SUM;
     if (result->code != WHISKER_CODE_OK)
         return;
-    const uint8_t sets = (uint8_t)(words[0] >> (plain ? 4 : layout->status) & SETS_MASK);
-    if (sets == sensor->sets)
+    sensor->sets = (uint8_t)(words[0] >> status & SETS_MASK);
+    if (sensor->sets == before)
         result->code = WHISKER_CODE_LINK_TICK; /* no conversion since */
-    sensor->sets = sets;
-    result->field.x = plain ? tmag5170_register(words[0]) : tmag5170_channel(words[0], layout->shift);
-    result->field.y = plain ? tmag5170_register(words[1]) : tmag5170_channel(words[0], layout->shift + 3);
-    result->field.z = plain ? tmag5170_register(words[2]) : tmag5170_channel(words[1], layout->shift);
+    result->field.x = pair ? tmag5170_channel(words[0], pair->shift) : tmag5170_register(words[0]);
+    result->field.y = pair ? tmag5170_channel(words[0], pair->shift + 3) : tmag5170_register(words[1]);
+    result->field.z = pair ? tmag5170_channel(words[1], pair->shift) : tmag5170_register(words[2]);
 }
 
 void tmag5170_take(struct sensor *sensors, struct sensor_result *results)

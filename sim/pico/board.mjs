@@ -38,8 +38,8 @@ class Flash {
 }
 
 export class Board {
-  constructor(image, sensors, { number = FLASH_NUMBER } = {}) {
-    Object.assign(this, { image, sensors, number, pulses: 0, lineStuck: false, drive: false, restarts: 0 });
+  constructor(image, sensors, { number = FLASH_NUMBER, registers = null } = {}) {
+    Object.assign(this, { image, sensors, number, registers, pulses: 0, lineStuck: false, drive: false, restarts: 0 });
     this.power();
   }
 
@@ -51,6 +51,7 @@ export class Board {
     for (const sensor of this.sensors) if (sensor) sensor.pending = null;
     m.logger = new ConsoleLogger(LogLevel.Error);
     m.flash.set(this.image);
+    m.usbDPRAM.fill(0xa5); // what the ROM left there
     this.measure();
     const flash = m.peripherals[0x18000] = new Flash(this.number);
     m.peripherals[0x40064] = { readUint32: (offset) => (offset === 8 ? chipReset : 0), writeUint32Atomic() {} };
@@ -60,7 +61,7 @@ export class Board {
     if (kept) { watchdog.scratchData.set(kept.scratch); watchdog.reason = kept.reason; }
     watchdog.tickEnable = false;
     const ticks = watchdog.writeUint32.bind(watchdog);
-    watchdog.writeUint32 = (offset, value) => { if (offset === 0x2c) this.microsecond = (value & 0x3ff) === (12 | 1 << 9); ticks(offset, value); };
+    watchdog.writeUint32 = (offset, value) => { if (offset === 0 && ![1 << 30, 2 ** 31, -(2 ** 31)].includes(value)) throw new Error(`the watchdog is told ${value}`); if (offset === 0x2c) this.microsecond = (value & 0x3ff) === (12 | 1 << 9); ticks(offset, value); };
     this.microsecond = false;
     watchdog.onWatchdogTrigger = () => {
       watchdog.timer.enable = false; // the stock model would fire again at once
@@ -78,6 +79,7 @@ export class Board {
     m.sram.set(boot2, BOOT2_AT - RAM);
     m.core.SP = 0x20041f00;
     m.core.PC = BOOT2_AT;
+    this.registers?.watch(m, resets);
     const program = m.readUint32.bind(m);
     m.readUint32 = (at) => { if (at >>> 0 >= 0x10000000 && at >>> 0 < 0x11000000 && !flash.readable()) throw new Error('flash is read before it is readable'); return program(at); };
     this.usbChanged?.();

@@ -29,6 +29,7 @@ export class Host {
   armed(offset, value) {
     const now = this.board.mcu.clock.nanos, before = this.settling[offset];
     if (value & AVAILABLE && (!before || before.value !== (value & ~AVAILABLE) || now - before.at < 1e9 / 48e6)) this.errors.push(`buffer ${offset.toString(16)} is available before it has settled`);
+    if (value & ~0xafff) this.errors.push(`buffer ${offset.toString(16)}: ${value.toString(16)} is of a second one`);
     this.settling[offset] = { value, at: now };
   }
 
@@ -41,7 +42,7 @@ export class Host {
   }
   reset() {
     this.fail('reset');
-    Object.assign(this, { address: 0, toggles: [0, 0, 0], asleep: false });
+    Object.assign(this, { address: 0, toggles: [0, 0, 0], asleep: false, fresh: 2 });
     this.usb.sieStatus |= 1 << 19;
     this.usb.sieStatusUpdated();
   }
@@ -51,6 +52,7 @@ export class Host {
   startFrame() {
     this.timer.schedule(FRAME_NS);
     if (!this.connected() || this.asleep) return;
+    if (this.fresh > 0 && --this.fresh === 0 && !this.now) for (const offset of [0x80, 0x84, 0x88, 0x90]) if (this.buffer(offset) & (AVAILABLE | STALL)) this.errors.push(`buffer ${offset.toString(16)} is of before the reset`);
     this.frame = (this.frame + 1) & 0x7ff;
     this.usb.sofFrameNumber = this.frame;
     this.usb.intRaw |= 1 << 17;
@@ -114,6 +116,8 @@ export class Host {
     if (!this.now && !(this.now = this.queue.shift() ?? null)) return undefined;
     const c = this.now, wanted = c.setup[6] | c.setup[7] << 8, inward = (c.setup[0] & 0x80) !== 0;
     let got = 'next';
+    const idle = c.stage === 'out' ? 0x80 : c.stage === 'confirm' || (c.stage === 'in' && c.got.length === 0) ? 0x84 : null;
+    if (idle && this.buffer(idle) & AVAILABLE) this.errors.push(`endpoint 0: ${c.stage}, and the other way is armed`);
     if (c.stage === 'setup') {
       if (this.addressed()) {
         this.board.mcu.usbDPRAM.set(c.setup, 0);

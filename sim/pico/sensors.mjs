@@ -52,17 +52,18 @@ const ORDERS = { maker: [[16, 12, 4], [24, 20, 8], 28], plain: [[24, 20, 16], [1
 export class Tmag5170 extends Sensor {
   constructor(field, { order = 'maker', inverted = 0, special = true } = {}) {
     super(field);
-    Object.assign(this, { mode: 0, conversionNs: 105e3, order: ORDERS[order], inverted, special });
+    Object.assign(this, { mode: 0, order: ORDERS[order], inverted, special });
     this.registers = new Uint16Array(32);
     this.results = [0, 0, 0];
     this.sets = 0;
-    this.flips = []; // bits to invert in coming answers, one entry an answer: null or a bit's number
+    this.flips = []; // of coming answers, one entry an answer: the bits to invert
   }
   triggered() {
     return (this.registers[0] >> 4 & 7) === 3 && (this.registers[2] >> 9 & 3) === 2 && (this.registers[1] >> 6 & 7) === 7;
   }
+  get conversionNs() { return 25e3 * (1 + 3 * 2 ** (this.registers[0] >> 12 & 7)) * 1.05; } // 5 % slower than typical
   quantise(field) {
-    return field.map((mT) => Math.max(-32768, Math.min(32767, Math.round(mT * 32768 / 50))));
+    return field.map((mT, axis) => Math.max(-32768, Math.min(32767, Math.round(mT * 32768 / [50, 25, 100][this.registers[1] >> 2 * axis & 3]))));
   }
   // What a reading of these counts shows: 12 bits of pairs, 16 of registers.
   shown(counts) {
@@ -103,8 +104,7 @@ export class Tmag5170 extends Sensor {
   }
   flip(word, first) {
     if (first) return 0;
-    const bit = this.flips.length ? this.flips.shift() : null;
-    return bit === null ? word : (word ^ (2 ** bit)) >>> 0;
+    return (word ^ (this.flips.shift() ?? 0)) >>> 0;
   }
   finish(word) {
     return this.flip((word | (crc4(word) ^ (this.answerSpecial ? this.inverted : 0))) >>> 0);

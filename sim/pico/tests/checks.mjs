@@ -1,6 +1,7 @@
 // checks.mjs IMAGE [NAME | --first]: what the image does by itself and on the bus, a line of JSON: name and null, or what went wrong;
 // --first: until something does.
 import { Bench, CODE, Judge, MS, decode, tell, tmags } from './bench.mjs';
+import { Registers, SET_TO } from '../registers.mjs';
 import { Mlx90393, Stranger, Tmag5170, wandering } from '../sensors.mjs';
 
 const [image, only] = process.argv.slice(2);
@@ -24,6 +25,29 @@ function regular({ bench, judge }) {
 function codes(run, lane) { return run.frames.map((f) => f.lanes[lane].code); }
 
 const CHECKS = {
+  what_the_chip_is_set_to() {
+    const registers = new Registers(), run = started(tmags(16), { period: 30000 }, { registers });
+    run.bench.board.run(20 * MS);
+    same(registers.differences(), [], `of ${Object.keys(SET_TO).length} registers`);
+    same(registers.memory(run.bench.board.mcu), [], 'memory of the controller');
+    regular(run);
+  },
+  a_run_begins_with_tick_0_at_any_moment() {
+    const bench = new Bench(image, tmags(1));
+    bench.enumerate();
+    bench.board.run(60 * MS);
+    const frames = [];
+    bench.stream((raw) => frames.push(decode(raw)));
+    for (let i = 0; i < 80; i++) {
+      frames.length = 0;
+      same(bench.control(1, { mask: 1 }), null, 'start');
+      bench.board.run(1.9 * MS);
+      same(bench.control(0, { mask: 1 }), null, 'stop');
+      bench.board.run(1.2 * MS + 6.7e3 * i);
+      same(frames.map((f) => f.tick), frames.map((_, at) => at), `ticks of start ${i}`);
+      want(frames.length > 3 && frames.length < 8, `frames ${frames.length}`);
+    }
+  },
   layouts_of_a_pair_of_axes() {
     for (const order of ['maker', 'plain', 'sheet'])
       for (const inverted of [0, 1]) {
@@ -85,7 +109,7 @@ const CHECKS = {
     same([0, 1, 2, 3, 4].map((lane) => codes(run, lane).at(-1)), [CODE.magnet, CODE.magnet, CODE.ok, CODE.magnet, CODE.ok], 'codes');
   },
   a_field_beyond_the_range_is_told() {
-    const run = started([new Tmag5170(() => [60, 0, 20]), new Tmag5170(() => [0, 0, -60])], { mask: 3 });
+    const run = started([new Tmag5170(() => [110, 0, 20]), new Tmag5170(() => [0, 0, -110])], { mask: 3 });
     run.bench.board.run(10 * MS);
     same([0, 1].map((lane) => run.frames.at(-1).lanes[lane].errors), [2, 2], 'errors');
   },
@@ -114,6 +138,30 @@ const CHECKS = {
     run.bench.board.lineStuck = false;
     run.bench.board.run(5 * MS);
     same(codes(run, 1).at(-1), CODE.ok, 'code');
+  },
+  a_line_low_while_the_number_of_conversions_comes_round() {
+    const run = started(tmags(2), { mask: 3 });
+    run.bench.board.run(10.4 * MS);
+    for (const ticks of [7, 15]) {
+      const from = run.frames.length;
+      run.bench.board.sensors[1].low = true;
+      run.bench.board.run(ticks * MS / 2);
+      run.bench.board.sensors[1].low = false;
+      run.bench.board.run(10 * MS);
+      same(codes({ frames: run.frames.slice(from) }, 1).filter((c) => c !== 0), [...Array(ticks).fill(CODE.start), CODE.resync], 'codes');
+    }
+  },
+  a_damaged_frame_with_a_right_sum_is_seen() { // its number of the conversion, or Y, is not the other frame's
+    const run = started(tmags(1), { mask: 1 }), plain = started(tmags(1, { special: false }), { mask: 1 });
+    for (const [of, before, bits] of [[run, [], 0x13 << 4], [run, [], 0x13 << 8], [run, [0], 0x13 << 8], [run, [0], 0x13 << 21], [run, [], 0x13 << 27], [plain, [0, 0], 0x13 << 2]]) {
+      of.bench.board.run(10.4 * MS);
+      const from = of.frames.length;
+      of.bench.board.sensors[0].flips.push(...before, bits);
+      of.bench.board.run(10 * MS);
+      const told = codes({ frames: of.frames.slice(from) }, 0).filter((c) => c !== 0);
+      same(told[0], CODE.sum, `bits ${bits} behind ${before.length} frames: ${told}`);
+      same(of.judge.altered, 0, 'altered');
+    }
   },
   requests_of_chapter_9() {
     const OK = null, NO = 'stall', bench = new Bench(image, tmags(1));
@@ -175,7 +223,7 @@ const CHECKS = {
     const bench = new Bench(image, tmags(1));
     bench.enumerate();
     const before = [...bench.get(1, 16).bytes];
-    const wrong = { 0: [7], 1: [1, 3], 2: [2], 3: [4, 7, 34], 4: [29], 5: [0, 17], 6: [1, 2, 16], 7: [1], 11: [0x10], 13: [0x5d], 15: [1] };
+    const wrong = { 0: [7], 1: [1, 3], 2: [2], 3: [4, 7, 34], 4: [29], 5: [0, 17], 6: [1, 2, 16], 7: [1], 11: [0x10], 13: [0x69], 15: [1] };
     for (const [place, values] of Object.entries(wrong))
       for (const value of values) {
         const bytes = Uint8Array.from([1, 2, 1, 16, 180, 8, 0, 0, 1, 0, 0, 0, 0x30, 0x75, 0, 0]);
@@ -246,6 +294,10 @@ const CHECKS = {
     same(run.bench.request([2, 3, 0, 0, 0x81, 0, 0, 0]).why, null, 'halt');
     run.bench.board.run(5 * MS);
     const before = run.frames.length;
+    let why;
+    run.bench.host.read(1024, (end) => { why = end; });
+    run.bench.board.run(2 * MS);
+    same(why, 'stall', 'a read of the halted endpoint');
     same(run.bench.request([0x82, 0, 0, 0, 0x81, 0, 2, 0]).bytes[0], 1, 'status');
     same(run.bench.request([2, 1, 0, 0, 0x81, 0, 0, 0]).why, null, 'clear');
     run.bench.host.toggles[1] = 0;
@@ -253,6 +305,13 @@ const CHECKS = {
     run.bench.board.run(10 * MS);
     want(run.frames.length > before + 10, 'frames');
     same(run.bench.host.errors, [], 'errors of the bus');
+    const idle = new Bench(image, tmags(1));
+    idle.enumerate();
+    for (const feature of [3, 1]) same(idle.request([2, feature, 0, 0, 0x81, 0, 0, 0]).why, null, 'halt and clear without a run');
+    idle.host.read(1024, (end) => { why = end ?? 'data'; });
+    why = null;
+    idle.board.run(2 * MS);
+    same(why, null, 'a read with nothing to give');
   },
   a_reset_ends_the_run() {
     const run = started(tmags(1), { mask: 1 });
@@ -312,6 +371,14 @@ const CHECKS = {
       bench.control(1, { mask: 1 });
       bench.board.run(40 * MS);
       same([frames[0].lanes[0].code, frames.at(-1).lanes[0].code], [code, CODE.ok], `${name}: codes`);
+      bench.board.mcu.ppb.systickIntEnable = false;
+      for (let i = 0; i < 1100 && bench.board.restarts < 2; i++) bench.board.run(MS);
+      const later = [];
+      bench.enumerate();
+      bench.stream((raw) => later.push(decode(raw)));
+      bench.control(1, { mask: 1 });
+      bench.board.run(2 * MS);
+      same(later[0].lanes[0].code, CODE.watchdog, `${name}, then the watchdog`);
     }
   },
   the_kind_of_reset_is_told_until_the_sensor_is_there() {

@@ -41,7 +41,7 @@ function marred(mark, code) {
 }
 
 const KINDS = {
-  crc_of_an_answer() { const lane = draw(LANES), bit = draw(28) + 4; return only(since(() => sensors[lane].flips.push(...(draw(2) ? [null, bit] : [bit])), 6), lane, CODE.sum, 1, 1); },
+  crc_of_an_answer() { const lane = draw(LANES), bit = 2 ** (draw(28) + 4); return only(since(() => sensors[lane].flips.push(...(draw(2) ? [0, bit] : [bit])), 6), lane, CODE.sum, 1, 1); },
   absent_for_a_while() { return marred('away', CODE.absent); },
   line_low_for_a_while() { return marred('low', CODE.start); },
   conversion_line_stuck() {
