@@ -1,21 +1,33 @@
-// serve.mjs IMAGE LANES PACE: the executed board for whisker-pico-sim: transfers in on descriptor 3, their results on 4.
+// serve.mjs IMAGE LANES PACE FIELDS: the executed board for whisker-pico-sim: transfers in on descriptor 3, their results on 4.
 // Its time goes at PACE of the wall's, or slower; it waits for a host that reads frames and has not asked for the next yet.
 import fs from 'node:fs';
 import { Board } from './board.mjs';
 import { Host } from './host.mjs';
 import { Tmag5170 } from './sensors.mjs';
 
-const [image, lanes, pace] = process.argv.slice(2);
+const [image, lanes, pace, pipe] = process.argv.slice(2);
 const CONTROL = 0, BULK = 1, CANCEL = 2, RESET = 3, HEAD = 24, EPIPE = -32, EPROTO = -71;
 const SLICE_NS = 1e6, HOST_GONE_MS = 200; // without a read for so long no host waits for frames
 
-// A magnet that swings, each lane's at a rate of its own, with the noise of one conversion (0.14 mT, data sheet).
-function swinging(lane) {
-  const noise = () => 0.14 * Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
-  return (n) => [10 * Math.sin(n * (1 + lane / 8) / 600), 4 * Math.cos(n * (1 + lane / 8) / 900), 30].map((mT) => mT + noise());
+// The world's angles of each pulse, read from FIELDS as they are needed: counts of 180 degrees / 65536 from 0x8000, noise
+// and all (sim/world/sensor_noise.c), as the field of a magnet of FIELD_MT.
+const FIELD_MT = 60, TICK_BYTES = 4 * +lanes, fields = fs.openSync(pipe, 'r'), angles = Buffer.alloc(TICK_BYTES);
+let ticks = 0;
+function fieldOf(lane) {
+  while (ticks < board.pulses) {
+    for (let at = 0; at < TICK_BYTES;) {
+      const got = fs.readSync(fields, angles, at, TICK_BYTES - at);
+      if (got === 0) process.exit(0); // the world has ended
+      at += got;
+    }
+    ticks++;
+  }
+  const [x, y] = [0, 2].map((at) => Math.tan((angles.readUInt16LE(4 * lane + at) - 32768) * Math.PI / 65536));
+  const z = FIELD_MT / Math.hypot(1, x, y);
+  return [x * z, y * z, z];
 }
 
-const board = new Board(fs.readFileSync(image), Array.from({ length: 16 }, (_, n) => (n < +lanes ? new Tmag5170(swinging(n)) : null)));
+const board = new Board(fs.readFileSync(image), Array.from({ length: 16 }, (_, n) => (n < +lanes ? new Tmag5170(() => fieldOf(n)) : null)));
 const host = new Host(board), reads = new Map();
 let address = 0, heard = Buffer.alloc(0), readAt = -Infinity;
 

@@ -70,7 +70,7 @@ void sim_mechanics_counts(const struct mech_whisker *whisker, size_t ticks, doub
                           uint64_t seed, uint16_t *counts)
 {
     struct sim_sensor_noise noise;
-    sim_sensor_noise_start(&noise, sim_rng_stream(seed, FOR_SENSOR, 0));
+    sim_sensor_noise_start(&noise, SIM_SENSOR_MLX90333, sim_rng_stream(seed, FOR_SENSOR, 0));
     for (size_t i = 0; i < ticks; i++)
         mechanics_read_sensor(whisker, &noise, (double)i * tick_s, tilt + 2 * i, counts + 2 * i);
 }

@@ -186,19 +186,29 @@ static int sim_scene_read_origin(struct reader *reader)
     return sim_scene_read_pose(reader, &reader->scene->origin);
 }
 
+/* Which of two words follows the key: 0 or 1; or -1, refused. */
+static int sim_scene_choice(struct reader *reader, const char *first, const char *second)
+{
+    char **word = reader->text.word;
+    if (strcmp(word[1], first) == 0)
+        return 0;
+    if (strcmp(word[1], second) == 0)
+        return 1;
+    return sim_text_refuse(&reader->text, "%s: '%s'; use %s or %s", word[0], word[1], first, second);
+}
+
 static int sim_scene_read_mechanics(struct reader *reader)
 {
-    static const struct {
-        const char *name;
-        enum sim_mechanics level;
-    } LEVELS[] = {{"static", SIM_MECHANICS_STATIC}, {"modes", SIM_MECHANICS_MODES}};
-    for (size_t i = 0; i < sizeof LEVELS / sizeof LEVELS[0]; i++) {
-        if (strcmp(reader->text.word[1], LEVELS[i].name) == 0) {
-            reader->scene->mechanics = LEVELS[i].level;
-            return 0;
-        }
-    }
-    return sim_text_refuse(&reader->text, "mechanics: '%s'; use static or modes", reader->text.word[1]);
+    const int choice = sim_scene_choice(reader, "static", "modes");
+    reader->scene->mechanics = choice == 1 ? SIM_MECHANICS_MODES : SIM_MECHANICS_STATIC;
+    return choice < 0 ? choice : 0;
+}
+
+static int sim_scene_read_sensor(struct reader *reader)
+{
+    const int choice = sim_scene_choice(reader, "mlx90333", "tmag5170");
+    reader->scene->sensor = choice == 1 ? SIM_SENSOR_TMAG5170 : SIM_SENSOR_MLX90333;
+    return choice < 0 ? choice : 0;
 }
 
 static int sim_scene_read_batch(struct reader *reader)
@@ -229,6 +239,7 @@ static const struct item {
     {"start", 3, 0, sim_scene_read_start},
     {"origin", 3, 0, sim_scene_read_origin},
     {"mechanics", 1, 0, sim_scene_read_mechanics},
+    {"sensor", 1, 0, sim_scene_read_sensor},
     {"batch", 1, 0, sim_scene_read_batch},
 };
 

@@ -14,6 +14,7 @@
  *   object_whisker NAME X Y YAW LENGTH        base and direction in the robot frame
  *   start X Y THETA
  *   mechanics LEVEL                           how whiskers bend (enum sim_mechanics, below); left out: static
+ *   sensor NAME                               what reads the magnets (enum sim_sensor); left out: mlx90333
  *   batch N                                   which whiskers of their kind the robot has: they differ by this number
  *
  * The whiskers in the order of the file are lanes 0, 1, ... Strict checks of what a person writes (TOML) are not
@@ -39,6 +40,9 @@ enum sim_role { SIM_TEXTURE_WHISKER, SIM_OBJECT_WHISKER };
 /* How whiskers bend: levels of mech_whisker.h. static: closed form with the plug; modes: large deflection, friction,
  * slip-off and vibration. A dragged tip has no large deflection of its own. */
 enum sim_mechanics { SIM_MECHANICS_STATIC = 0, SIM_MECHANICS_MODES = 3 };
+
+/* What noise a reading has: a node's sensor, or the Pico's at 2 kHz (sensor_noise.c). */
+enum sim_sensor { SIM_SENSOR_MLX90333, SIM_SENSOR_TMAG5170 };
 
 struct sim_pose {
     double x, y, theta; /* m, m, rad */
@@ -74,6 +78,7 @@ struct sim_scene {
     struct sim_pose start;
     struct sim_pose origin; /* of the arena's frame on the map, in which poses are reported */
     enum sim_mechanics mechanics;
+    enum sim_sensor sensor;
     uint32_t batch;
 };
 

@@ -58,7 +58,7 @@ static bool sim_world_start_lanes(sim_world *world, uint64_t seed)
     for (uint32_t i = 0; i < world->scene.whiskers; i++) {
         const struct sim_whisker *mount = &world->scene.whisker[i];
         struct lane *lane = &world->lane[i];
-        sim_sensor_noise_start(&lane->noise, sim_rng_stream(seed, FOR_SENSOR, i));
+        sim_sensor_noise_start(&lane->noise, world->scene.sensor, sim_rng_stream(seed, FOR_SENSOR, i));
         if (mount->role == SIM_TEXTURE_WHISKER) {
             struct sim_point tip = sim_texture_whisker_tip(mount, world->pose);
             lane->first_tile = sim_arena_tile(&world->scene, tip);

@@ -20,8 +20,9 @@ import pico_image as tool  # noqa: E402
 
 WRITE = re.compile(r"^\s+(?:REG|SET|CLEAR)\([^;]*?\) = [^;]*;", re.MULTILINE)
 CHECK_S = 240  # a mutant that takes longer stands still, and counts as noticed
-# Same behaviour in the emulator and on the bus; none of them may be drawn without being looked at.
-EQUIVALENT = ("REG(SSI_SSIENR) = 0;", "REG(SSI_BAUDR) = FLASH_DIVIDER;")
+# Same behaviour in the emulator and on the bus: without it the flash is read, too, and a low bit of a dividend turns an
+# angle by less than a count.
+EQUIVALENT = ("REG(SSI_SSIENR) = 0;", "REG(SSI_BAUDR) = FLASH_DIVIDER;", "REG(SIO_DIVIDEND) = dividend;")
 
 
 def writes() -> list[tuple[str, int, int]]:
@@ -67,9 +68,11 @@ def run(count: int, seed: int) -> list[tuple[str, str | None]]:
             folder = Path(temporary) / "pico"
             shutil.copytree(tool.FIRMWARE, folder)
             text = (folder / name).read_text()
-            (folder / name).write_text(mutate(text, begin, end, draw))
             line = text[:begin].count("\n") + 1
-            results.append((f"{name}:{line}: {' '.join(text[begin:end].split())}", noticed(folder)))
+            changed = mutate(text, begin, end, draw)
+            (folder / name).write_text(changed)
+            became = " ".join(changed[begin : len(changed) - len(text) + end].split())
+            results.append((f"{name}:{line}: {' '.join(text[begin:end].split())} {became}", noticed(folder)))
             print(*results[-1], sep="  ->  ", flush=True)
     return results
 

@@ -4,6 +4,7 @@ With whiskerd on it, or, by --usbip, as a USB device for a Linux kernel.
 """
 
 import argparse
+import os
 import re
 import signal
 import subprocess
@@ -14,6 +15,7 @@ from pathlib import Path
 
 from crunchbot.arguments import RING, number_above, whole_number
 from crunchbot.bridge.ring import Reader, RingError
+from crunchbot.commands.robot import SENSORS
 from crunchbot.errors import UserError
 from crunchbot.outputs import put
 from crunchbot.programs import SOURCE_TREE, program
@@ -21,17 +23,16 @@ from crunchbot.stopping import stop_on_signals
 from whisker_protocol import LANES, LIMITS
 
 from ..simulation.bridge import COURSES, Course, flat_scene, read_faults
+from ..simulation.pico import Fields
 from ..simulation.scenes import MECHANICS
 
 EXAMPLE = "whisker bridge-sim --lanes 6 --seconds 60 &  whisker top"
 TICKS_PER_S = LIMITS["clock_hz"] // LIMITS["tick_period"]
 DAY_S = 86400.0
-UP_S = 60.0  # for the simulated bridge to enumerate
 USBIP_PORT = 3240  # registered for USB/IP
 PORT_MAX = 65535
 LEVELS = ("rtl", "bytes")
-BOARDS = ("bridge", "pico")
-PICO_LANES, PICO_LANES_MAX = 8, 16
+PICO_LANES_MAX = 16
 PICO_SIM, PICO_IMAGE = SOURCE_TREE / "sim/pico", SOURCE_TREE / "firmware/images/pico/pico.bin"
 
 
@@ -60,22 +61,20 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     port = whole_number(0, PORT_MAX)
     parser.add_argument("--usbip", nargs="?", type=port, const=USBIP_PORT, metavar="PORT", help=text)
-    text = "bridge: gateware, nodes and MLX90333; pico: the firmware of the Pico, executed, with TMAG5170s"
-    parser.add_argument("--board", choices=BOARDS, default=BOARDS[0], help=text)
+    text = "bridge: gateware, nodes and MLX90333; pico: the firmware of the Pico, executed (slower than real time), with TMAG5170s"
+    parser.add_argument("--board", choices=list(SENSORS), default="bridge", help=text)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     stop, over = stop_on_signals(), threading.Event()
     with tempfile.TemporaryDirectory(prefix="whisker-") as folder:
-        command = _command(arguments, Path(folder))
+        command, course = _command(arguments, Path(folder), over)
         pipes = {"stderr": subprocess.PIPE, "stdout": None if arguments.usbip is None else subprocess.PIPE}
         with subprocess.Popen(command, text=True, start_new_session=True, **pipes) as process:
             watcher = threading.Thread(target=_relay, args=(process,), daemon=True)
             watcher.start()
-            course = Course(Path(folder) / "sim.sock", arguments.drive, arguments.pace, over)  # it drives until the end
-            if arguments.board == BOARDS[0]:
-                course.start()
+            course.start()  # it drives until the end
             if arguments.usbip is None:
                 _await_ring(arguments.ring, process, stop)
             else:
@@ -87,18 +86,17 @@ def run(arguments: argparse.Namespace) -> int:
                 process.send_signal(signal.SIGTERM)
             process.wait()
             over.set()
-            if arguments.board == BOARDS[0]:
-                course.join()
+            course.join()
             watcher.join()
     return 0 if stopped else process.returncode
 
 
-def _command(arguments, folder: Path) -> list[str]:
-    """The simulation under umockdev with whiskerd inside, or as a server."""
-    if arguments.board == "pico":
-        return _pico_command(arguments)
-    text, whiskers = flat_scene(arguments.scene, arguments.seed, arguments.mechanics)
+def _command(arguments, folder: Path, over: threading.Event) -> tuple[list[str], threading.Thread]:
+    """The simulation under umockdev with whiskerd inside, or as a server; and who drives its robot."""
+    text, whiskers = flat_scene(arguments.scene, arguments.seed, arguments.mechanics, SENSORS[arguments.board])
     lanes = max(arguments.lanes or whiskers, whiskers)
+    if arguments.board == "pico":
+        return _pico_command(arguments, folder, text, lanes)
     put(folder / "scene.flat", text, sync=False)
     words = [program("umockdev-wrapper")] if arguments.usbip is None else []
     words += [program("whisker-bridge-sim"), "--scene", folder / "scene.flat"]
@@ -112,28 +110,26 @@ def _command(arguments, folder: Path) -> list[str]:
         words += ["--", program("whiskerd"), "--ring", arguments.ring, "--lane-mask", mask]
     else:
         words += ["--usbip", arguments.usbip]
-    return [str(word) for word in words]
+    return [str(word) for word in words], Course(folder / "sim.sock", arguments.drive, arguments.pace, over)
 
 
-def _pico_command(arguments) -> list[str]:
+def _pico_command(arguments, folder: Path, text: str, lanes: int) -> tuple[list[str], threading.Thread]:
     if not (PICO_SIM / "node_modules/rp2040js").is_dir():
         raise UserError("bridge-sim: the emulator of the Pico is not there; run: make setup-tests")
-    lanes = arguments.lanes or PICO_LANES
     if lanes > PICO_LANES_MAX:
         raise UserError(f"bridge-sim: --lanes {lanes}: a Pico has {PICO_LANES_MAX}; give fewer")
     words = [program("umockdev-wrapper")] if arguments.usbip is None else []
     words += [program("whisker-pico-sim"), *([] if arguments.usbip is None else ["--usbip", arguments.usbip])]
-    words += ["node", PICO_SIM / "serve.mjs", PICO_IMAGE, lanes, arguments.pace or 1]
+    words += ["node", PICO_SIM / "serve.mjs", PICO_IMAGE, lanes, arguments.pace or 1, folder / "fields"]
+    os.mkfifo(folder / "fields")
     if arguments.usbip is None:
         words += ["--", program("whiskerd"), "--ring", arguments.ring, "--lane-mask", (1 << lanes) - 1]
-    return [str(word) for word in words]
+    return [str(word) for word in words], Fields(folder / "fields", text, arguments.seed, arguments.drive, lanes)
 
 
 def _await_ring(ring: str, process: subprocess.Popen, stop: threading.Event) -> None:
     """Say when the ring is up; nothing when the simulation ended before, which says why itself."""
-    for _ in range(int(UP_S / 0.1)):
-        if process.poll() is not None or stop.is_set():
-            return
+    while process.poll() is None and not stop.is_set():
         try:
             with Reader(ring, 0.1) as reader:
                 reader.wait(0.1)

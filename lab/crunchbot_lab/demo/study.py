@@ -18,20 +18,25 @@ from crunchbot.robot.models import load_models
 from crunchbot.scene import Scene
 
 from ..report.run import FILTERS
-from ..simulation.scenes import MECHANICS, make_scene
+from ..simulation.scenes import MECHANICS, SENSORS, make_scene
 from .level1 import explore
 from .summary import pose_scores, rounded, texture_scores
 from .training import METHODS, learn, radial_scores
 
 
 def study(
-    seed: int, seconds: float, models: Path, mechanics: str = MECHANICS[0], whiskers: tuple[str, ...] | None = None
+    seed: int,
+    seconds: float,
+    models: Path,
+    mechanics: str = MECHANICS[0],
+    whiskers: tuple[str, ...] | None = None,
+    sensor: str = SENSORS[0],
 ) -> dict:
     """The navigation and texture figures of the summary for one seed, from a level-1 run with the models in a folder.
 
     whiskers: what the simulated world is given of them (`Scene.simulated`), if they are not the seed's own.
     """
-    scene, start = make_scene(seed, mechanics)
+    scene, start = make_scene(seed, mechanics, sensor)
     scene = scene if whiskers is None else replace(scene, simulated=whiskers)
     pilot = Pilot(scene.robot, *load_models(models, scene.robot), seed)
     rows, truth = explore(scene, start, pilot, seed, round(seconds * 2000))
@@ -51,14 +56,15 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0])
+    parser.add_argument("--sensor", choices=SENSORS, default=SENSORS[0])
     parser.add_argument("--texture", choices=METHODS, default=METHODS[0])
     options = parser.parse_args(argv)
     print("seed  whisks  texture  grid (m)  90 % (m)  foveal (m)  odometry (m)  radial std / predicted")
     for seed in options.seeds:
-        scene, _ = make_scene(seed, options.mechanics)
+        scene, _ = make_scene(seed, options.mechanics, options.sensor)
         with tempfile.TemporaryDirectory() as models:
             radial = radial_scores(scene, *learn(Path(models), scene, seed, lambda: None, options.texture))
-            s = study(seed, options.seconds, Path(models), options.mechanics)
+            s = study(seed, options.seconds, Path(models), options.mechanics, sensor=options.sensor)
         ratios = [radial["radial_std_mm"][n] / p for n, p in radial["radial_std_predicted_mm"].items()]
         print(
             f"{seed:4d} {s['whisks']:7d} {s['texture_accuracy']:8.3f} {s['pose_error_median_m']:9.3f} "

@@ -33,7 +33,7 @@ BESIDE_M = 0.4  # from the wall at first
 SWEEPS = 12
 POST_M = 0.03  # side of the square post
 TOWARDS_RAD = math.radians(10.0)  # between the whisker at first contact and the post's face that runs along it
-ROBOT_LINES = r"(body_|texture_|object_|mechanics |batch )"  # of a scene's flat text
+ROBOT_LINES = r"(body_|texture_|object_|mechanics |sensor |batch )"  # of a scene's flat text
 BENCH_M = 4.0  # side of the empty arena around it
 
 

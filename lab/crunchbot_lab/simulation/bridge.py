@@ -12,9 +12,10 @@ from crunchbot.pilot.behaviour import WHISK_RAD_S
 from crunchbot.scene import Prior, Scene, in_arena, load
 from whisker_protocol import LIMITS, SENSOR_ERRORS
 
-from .scenes import MECHANICS, START_CLEARANCE_M, make_scene, simulated
+from .scenes import MECHANICS, SENSORS, START_CLEARANCE_M, make_scene, simulated
 
 BLOCK_TICKS = 40  # the robot is given one order per block (sim/robot/pilot_answers.h)
+BLOCK_S = BLOCK_TICKS * LIMITS["tick_period"] / LIMITS["clock_hz"]
 AHEAD_BLOCKS = 25  # orders given in advance: half a second, so that pacing is smooth
 TURN_RAD_S = 0.5  # a floor whisker's tip then goes at 0.1 m/s
 # What a robot does over and over: (seconds, rad/s). `whisk`: body whisks to either side, rest before each pair.
@@ -32,21 +33,23 @@ class SimulationError(UserError):
 
 
 def simulated_scene(
-    folder: str | None, seed: int, mechanics: str = MECHANICS[0]
+    folder: str | None, seed: int, mechanics: str = MECHANICS[0], sensor: str = SENSORS[0]
 ) -> tuple[Scene, tuple[float, float, float]]:
     """(scene, start pose): of this folder, or the demo's of this seed.
 
-    `mechanics`: how its whiskers bend; which ones they are is the seed's. Models are to be learnt from this very scene.
+    `mechanics`: how its whiskers bend; `sensor`: what reads them; which ones they are is the seed's. Models are to be learnt from this very scene.
     """
     if folder is None:
-        return make_scene(seed, mechanics)
-    scene = replace(load(folder), simulated=simulated(mechanics, seed))
+        return make_scene(seed, mechanics, sensor)
+    scene = replace(load(folder), simulated=simulated(mechanics, seed, sensor))
     return scene, _start(scene, folder)
 
 
-def flat_scene(folder: str | None, seed: int, mechanics: str = MECHANICS[0]) -> tuple[str, int]:
+def flat_scene(
+    folder: str | None, seed: int, mechanics: str = MECHANICS[0], sensor: str = SENSORS[0]
+) -> tuple[str, int]:
     """(a simulated scene as the simulation reads it, number of whiskers)."""
-    scene, start = simulated_scene(folder, seed, mechanics)
+    scene, start = simulated_scene(folder, seed, mechanics, sensor)
     return scene.flat(start), len(scene.robot.whiskers)
 
 
@@ -140,6 +143,11 @@ def _number(entry: dict, key: str, kind: type = int) -> float:
     return value
 
 
+def turns(drive: str) -> list[float]:
+    """A course of COURSES, an order a block of ticks (rad/s)."""
+    return [turn for seconds, turn in COURSES[drive] for _ in range(round(seconds / BLOCK_S))]
+
+
 class Course(threading.Thread):
     """Drives the simulated robot and keeps its time to the wall's: the simulation waits for orders."""
 
@@ -147,9 +155,8 @@ class Course(threading.Thread):
         """`drive`: one of COURSES; `pace`: simulated seconds per second; 0: no limit."""
         super().__init__(daemon=True)
         self._path, self._stop_event = path, stop
-        block_s = BLOCK_TICKS * LIMITS["tick_period"] / LIMITS["clock_hz"]
-        self._turns = [turn for seconds, turn in COURSES[drive] for _ in range(round(seconds / block_s))]
-        self._block_s = block_s / pace if pace > 0 else 0.0
+        self._turns = turns(drive)
+        self._block_s = BLOCK_S / pace if pace > 0 else 0.0
 
     def run(self) -> None:
         """Order by order until the simulation or its user has had enough."""

@@ -24,6 +24,7 @@ RADIAL_SIGMA_M = 0.005
 
 # Of sim/world (sim_scene.h); the first is the default.
 MECHANICS = ("static", "modes")
+SENSORS = ("mlx90333", "tmag5170")
 
 PRIOR_OFF_M = 0.2
 PRIOR_OFF_RAD = math.radians(10)
@@ -46,12 +47,16 @@ def _object_whisker(name: str, tip_angle: float) -> Whisker:
     return Whisker(name, "object", base_m=base, yaw_rad=base_angle - outwards * math.pi / 2, length_m=WHISKER_M)
 
 
-def simulated(mechanics: str, seed: int) -> tuple[str, ...]:
-    """What the simulated world is given beside a scene: how whiskers bend (one of MECHANICS), and which whiskers."""
-    return (f"mechanics {mechanics}", f"batch {seed % 2**32}")
+def simulated(mechanics: str, seed: int, sensor: str = SENSORS[0]) -> tuple[str, ...]:
+    """What the simulated world is given beside a scene: how whiskers bend (one of MECHANICS), which whiskers, and what reads
+    their magnets (one of SENSORS).
+    """
+    return (f"mechanics {mechanics}", f"batch {seed % 2**32}", *([f"sensor {sensor}"] if sensor != SENSORS[0] else []))
 
 
-def make_scene(seed: int, mechanics: str = MECHANICS[0]) -> tuple[Scene, tuple[float, float, float]]:
+def make_scene(
+    seed: int, mechanics: str = MECHANICS[0], sensor: str = SENSORS[0]
+) -> tuple[Scene, tuple[float, float, float]]:
     """The seed's scene, its prior included, and the true start pose (x, y, theta)."""
     random = np.random.default_rng([seed, 1])
     arena = _make_arena(random)
@@ -64,7 +69,7 @@ def make_scene(seed: int, mechanics: str = MECHANICS[0]) -> tuple[Scene, tuple[f
         start[2] + turn,
     )
     prior = Prior("gaussian", mean, PRIOR_SIGMA)
-    return Scene(arena, make_robot(), prior, simulated(mechanics, seed)), start
+    return Scene(arena, make_robot(), prior, simulated(mechanics, seed, sensor)), start
 
 
 def _make_arena(random: np.random.Generator) -> Arena:

@@ -285,7 +285,12 @@ const CHECKS = {
       for (const stage of ['in', 'out', 'status', 'confirm']) {
         bench.request(setup, data, stage);
         same(bench.get(3, 16).bytes.length, 16, `after ${setup} given up at ${stage}`);
+        bench.request(setup, data, stage);
+        same(bench.control(0), null, `a report after ${setup} given up at ${stage}`);
       }
+    bench.request([0x80, 6, 0, 1, 0, 0, 18, 0], undefined, 'status');
+    bench.host.reset();
+    bench.board.run(4 * MS);
     same(bench.host.errors, [], 'errors of the bus');
   },
   a_halted_endpoint_goes_on_with_data0() {
@@ -316,6 +321,8 @@ const CHECKS = {
   a_reset_ends_the_run() {
     const run = started(tmags(1), { mask: 1 });
     run.bench.board.run(10 * MS);
+    run.bench.host.storm = 400; // a packet waits, so that the reset finds one
+    run.bench.board.run(2 * MS);
     run.bench.host.reset();
     run.bench.board.run(5 * MS);
     run.bench.enumerate(9);

@@ -66,12 +66,14 @@ static void test_poses_are_reported_on_the_map(void **state)
     assert_near(reported.theta, 3.0 - 1.5 * 3.14159265358979324, 1e-12);
 }
 
-static void test_mechanics_and_batch(void **state)
+static void test_mechanics_sensor_and_batch(void **state)
 {
     (void)state;
     assert_int_equal(parse(GOOD), 0);
     assert_int_equal(scene.mechanics, SIM_MECHANICS_STATIC);
-    assert_int_equal(parse(GOOD "mechanics modes\nbatch 7\n"), 0);
+    assert_int_equal(scene.sensor, SIM_SENSOR_MLX90333);
+    assert_int_equal(parse(GOOD "mechanics modes\nbatch 7\nsensor tmag5170\n"), 0);
+    assert_int_equal(scene.sensor, SIM_SENSOR_TMAG5170);
     assert_int_equal(scene.mechanics, SIM_MECHANICS_MODES);
     assert_int_equal(scene.batch, 7);
 }
@@ -104,6 +106,7 @@ static const struct {
     {"", "obstacle 0 0 1 1 GRASS\n", "obstacle: no texture is called 'GRASS'"},
     {"", "obstacle 0 0 1 1 VINYL 1\n", "obstacle: 6 values; must be 4"},
     {"", "mechanics soft\n", "mechanics: 'soft'; use static or modes"},
+    {"", "sensor hall\n", "sensor: 'hall'; use mlx90333 or tmag5170"},
     {"", "batch -1\n", "batch: -1; give a whole number"},
     {"", "batch 1.5\n", "batch: 1.5; give a whole number"},
     {"", "tile_m\n", "test.scene:13: tile_m: 0 values; must be 1"},
@@ -201,7 +204,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_good_scene),
         cmocka_unit_test(test_poses_are_reported_on_the_map),
-        cmocka_unit_test(test_mechanics_and_batch),
+        cmocka_unit_test(test_mechanics_sensor_and_batch),
         cmocka_unit_test(test_faces_may_have_textures),
         cmocka_unit_test(test_blanks_do_not_matter),
         cmocka_unit_test(test_malformed_scenes_are_refused),

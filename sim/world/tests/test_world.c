@@ -134,12 +134,12 @@ static void test_odometry_adds_up_to_the_motion(void **state)
     sim_world_free(world);
 }
 
-/* At rest in the open: white noise of 0.03 degrees about a drift within 0.05. */
-static void test_noise_at_rest(void **state)
+/* At rest in the open: white noise about a drift within 0.05. */
+static void assert_noise_at_rest(enum sim_sensor sensor, double noise_deg)
 {
-    (void)state;
     enum { N = 400 * TICKS_PER_S, WINDOW = TICKS_PER_S };
     struct sim_scene scene = bench(4, 2, 2, 0);
+    scene.sensor = sensor;
     sim_world *world = sim_world_new(&scene, 4);
     double lowest = 1, highest = -1, square = 0, sum = 0, sum_square = 0;
     for (int n = 1; n <= N; n++) {
@@ -155,10 +155,17 @@ static void test_noise_at_rest(void **state)
         square += (sum_square - sum * sum) * WINDOW / N;
         sum = sum_square = 0;
     }
-    assert_near(sqrt(square), 0.03, 0.001);
+    assert_near(sqrt(square), noise_deg, noise_deg / 30);
     assert_near(highest, 0.05, 0.004);
     assert_near(lowest, -0.05, 0.004);
     sim_world_free(world);
+}
+
+static void test_noise_at_rest(void **state)
+{
+    (void)state;
+    assert_noise_at_rest(SIM_SENSOR_MLX90333, 0.03);
+    assert_noise_at_rest(SIM_SENSOR_TMAG5170, 0.0955); /* 0.1 of 60 mT, and a step of 0.05 mT over the root of 12 */
 }
 
 /* Every lane and axis has noise of its own. */

@@ -27,6 +27,7 @@ EXAMPLE = "whisker robot --simulated --desktop"
 DAY_S = 86400.0
 VIEW_PORT = 8028
 PORT = Path("/dev/ttyUSB0")
+SENSORS = {"bridge": "mlx90333", "pico": "tmag5170"}  # of a simulated robot's whiskers, by its board
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -52,6 +53,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_zenoh_config(parser, "become tls/ADDRESS:PORT")
     text = "no hardware: the scene (default: the demo's of this seed) with a simulated robot, at the wall clock's pace"
     parser.add_argument("--simulated", action="store_true", help=text)
+    text = "of the simulated robot: bridge, or pico: with the noise of the Pico's TMAG5170s behind the simulated bridge"
+    parser.add_argument("--board", choices=list(SENSORS), default="bridge", help=text)
     parser.add_argument("--level", choices=("bytes", "rtl"), default="bytes", help="of the simulated bridge")
     parser.add_argument(
         "--seconds", type=number_above(0.0), default=DAY_S, metavar="S", help="simulated length (default: a day)"
@@ -121,6 +124,8 @@ def _look_first(arguments) -> None:
     """What would end a process over and over is said before any is started. UserError; warnings on standard error."""
     if arguments.simulated and arguments.no_daemon:
         raise UserError("robot: --simulated with --no-daemon: only a whiskerd of its own sees that bridge; give one")
+    if not arguments.simulated and arguments.board != "bridge":
+        raise UserError("robot: --board without --simulated: whiskerd finds out what is plugged in; leave it out")
     if not arguments.simulated and not (arguments.scene and arguments.models):
         raise UserError("robot: no SCENE or no --models; give both, or --simulated")
     if arguments.scene:
@@ -165,7 +170,9 @@ def _simulated(arguments, meeting: parts.Meeting, files: dict[str, Path]) -> tup
     out, seed, user = arguments.out, arguments.seed, "robot: --simulated"
     folder = arguments.scene or files["scene"]
     bridge = import_lab("simulation.bridge", user)
-    scene, start = bridge.simulated_scene(arguments.scene and str(arguments.scene), seed)
+    scene, start = bridge.simulated_scene(
+        arguments.scene and str(arguments.scene), seed, sensor=SENSORS[arguments.board]
+    )
     if arguments.scene is None:
         with made(folder, False, scenes.HELD) as fresh:
             scenes.write(fresh, scene)
