@@ -90,7 +90,7 @@ ROOMS = {
         "scenes": ["simulation"],
         "report": ["scenes"],
         "demo": ["signals", "simulation", "scenes", "report"],
-        "commands": ["simulation", "scenes", "report"],
+        "commands": ["signals", "simulation", "scenes", "report"],
     },
 }
 INCLUDE = re.compile(r'^\s*[#`]include\s+["<]([^">]+)[">]', re.MULTILINE)

@@ -23,8 +23,8 @@ from crunchbot.stopping import stop_on_signals
 from whisker_protocol import LANES, LIMITS
 
 from ..simulation.bridge import COURSES, Course, flat_scene, read_faults
-from ..simulation.pico import Fields
 from ..simulation.scenes import MECHANICS
+from .pico_world import Fields
 
 EXAMPLE = "whisker bridge-sim --lanes 6 --seconds 60 &  whisker top"
 TICKS_PER_S = LIMITS["clock_hz"] // LIMITS["tick_period"]

@@ -117,12 +117,27 @@ def test_a_simulated_robot_learns_its_own_whiskers(capsys, monkeypatch, tmp_path
     scenes.write(tmp_path / "given", make_scene(5)[0])
     options = [tmp_path / "given"] if given else []
     code, _, err = run(
-        capsys, "robot", *options, "--simulated", "--board", "pico", "--seed", 7, "--out", tmp_path / "out", "--first-port", free_port(3)
+        capsys,
+        "robot",
+        *options,
+        "--simulated",
+        "--board",
+        "pico",
+        "--seed",
+        7,
+        "--out",
+        tmp_path / "out",
+        "--first-port",
+        free_port(3),
     )
     assert code == 0, err
     flown = (tmp_path / "out/scene.flat").read_text().splitlines()
     robots = [
-        [line for line in text if line.split()[0] in ("mechanics", "batch", "sensor", "texture_whisker", "object_whisker")]
+        [
+            line
+            for line in text
+            if line.split()[0] in ("mechanics", "batch", "sensor", "texture_whisker", "object_whisker")
+        ]
         for text in (flown, training.flat(learnt[0]).splitlines())
     ]
     assert robots[0] == robots[1] and {"batch 7", "sensor tmag5170"} <= set(robots[0])

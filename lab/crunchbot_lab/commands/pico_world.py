@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..signals import World
-from .bridge import BLOCK_TICKS, turns
+from ..simulation.bridge import BLOCK_TICKS, turns
 
 REST = 0x8000  # of a lane that the scene has no whisker for
 
