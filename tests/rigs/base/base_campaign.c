@@ -562,7 +562,7 @@ static void begin_fault(const struct fault *fault)
 static void note_fault(const struct fault *fault)
 {
     const bool on = now_ms >= fault->from_ms && now_ms < fault->to_ms;
-    if (now_ms == fault->from_ms) {
+    if (now_ms == fault->from_ms && on) {
         begin_fault(fault);
     }
     if (now_ms == fault->to_ms && fault->kind == UNPLUG) {
