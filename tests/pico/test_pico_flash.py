@@ -1,4 +1,4 @@
-"""`whisker flash pico` on a model of the boot drive: a folder that takes files as the ROM's drive does, and leaves when it has all."""
+"""`whisker flash pico` on a model of the boot drive: a FAT image (fat.py), mounted in a folder, of which the ROM takes the sectors."""
 
 import struct
 import threading
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from pico.emulated import IMAGE
+from pico.fat import Drive
 
 from crunchbot.bridge import pico_drive
 from crunchbot.errors import UserError
@@ -19,7 +20,7 @@ class Machine:
 
     def __init__(self, root: Path, serial: str = "E6613852837F2B21"):
         self.root, self.serial, self.asked, self.drive = root, serial, 0, root / "media/user/RPI-RP2"
-        self.flash = b""
+        self.flash, self.image = b"", Drive()
         for folder in ("proc", "dev/disk/by-label", "sys/bus/usb/devices", "media/user"):
             (root / folder).mkdir(parents=True)
         (root / "proc/mounts").write_text("proc /proc proc rw 0 0\n")
@@ -41,8 +42,11 @@ class Machine:
             folder.rmdir()
 
     def show_drive(self) -> None:
+        """As a desktop mounts it: what the image holds, in a folder of its label's name."""
+        assert self.image.label() == self.drive.name
         self.drive.mkdir()
-        (self.drive / "INFO_UF2.TXT").write_text("UF2 Bootloader v3.0\nModel: Raspberry Pi RP2\nBoard-ID: RPI-RP2\n")
+        for name, content in self.image.files().items():
+            (self.drive / name).write_bytes(content)
         (self.root / "proc/mounts").write_text("proc /proc proc rw 0 0\n/dev/sdb1 /media/user/RPI-RP2 vfat rw 0 0\n")
         self.thread.start()
 
@@ -59,8 +63,9 @@ class Machine:
             files = [path for path in self.drive.iterdir() if path.suffix == ".uf2"]
             raw = files[0].read_bytes() if files else b""
             if len(raw) >= 512 and len(raw) == 512 * struct.unpack_from("<I", raw, 24)[0]:
-                blocks = [pico_drive.BLOCK.unpack_from(raw, at) for at in range(0, len(raw), 512)]
-                self.flash = b"".join(block[8][:256] for block in blocks)
+                self.image.write("PICO    UF2", raw)
+                self.flash = self.image.whole()
+                assert self.image.files()["PICO.UF2"] == raw
                 self.leave()
                 self.plug()
                 return
@@ -163,4 +168,25 @@ def test_a_board_that_does_not_come_back(machine, monkeypatch):
     machine.plug = lambda: time.sleep(0)
     machine.show_drive()
     with pytest.raises(UserError, match="has not come back"):
+        pico_drive.flash(UF2, None, machine.ask, machine.root)
+
+
+def test_the_drive_takes_blocks_of_its_family_alone():
+    wrong, half = Drive(), Drive()
+    wrong.write("WRONG   UF2", other_family(UF2.read_bytes()))
+    half.write("HALF    UF2", UF2.read_bytes()[: 512 * 20])
+    assert wrong.whole() is None and half.whole() is None
+    half.write("PICO    UF2", UF2.read_bytes())  # what was pulled while copying is begun again
+    assert half.whole()[: IMAGE.stat().st_size] == IMAGE.read_bytes()
+
+
+def test_two_drives_are_told(machine):
+    other = machine.root / "media/user/RPI-RP21"
+    machine.show_drive()
+    machine.ending.set()
+    other.mkdir()
+    (other / "INFO_UF2.TXT").write_bytes(machine.image.files()["INFO_UF2.TXT"])
+    mounts = machine.root / "proc/mounts"
+    mounts.write_text(mounts.read_text() + "/dev/sdc1 /media/user/RPI-RP21 vfat rw 0 0\n")
+    with pytest.raises(UserError, match="2 drives"):
         pico_drive.flash(UF2, None, machine.ask, machine.root)
