@@ -19,6 +19,7 @@ ALLOWED = {
     "lab/crunchbot_lab/demo/mapping.py": "likewise",
     "host/python/crunchbot/robot/journal.py": "goes on behind what its process wrote before",
     "host/python/crunchbot/robot/track.py": "likewise",
+    "lab/crunchbot_lab/commands/pico_world.py": "a pipe to the board that is simulated",
     "host/python/crunchbot/bridge/pico_drive.py": "the drive of a board, which takes the image as it comes",
 }
 
