@@ -33,7 +33,7 @@ ALLOWED = {
     "host/create": [],
     "host/command_line": [],
     "host/apps": ["host/libwhisker", "host/nav", "host/create", "host/command_line"],
-    "host/python": ["host/libwhisker", "host/nav", "protocol"],
+    "host/python": ["host/libwhisker", "host/nav", "host/create", "protocol"],
     "lab": ["host/python", "sim/signals", "protocol"],
     "sim/common": [],
     "sim/mlx90333": ["sim/common", "sim/node", "firmware/dspic"],  # one copy of the data sheet

@@ -3,16 +3,14 @@
 #include <math.h>
 #include <string.h>
 
+#include "create/judge.h"
+
 #define PERIOD_S (CREATE_OI_PERIOD_MS * 1e-3)
 #define DISTANCE_UNIT_M 1e-3                            /* of packet 19 */
 #define ANGLE_UNIT_RAD (3.14159265358979323846 / 180.0) /* of packet 20 */
 /* A unit dropped costs half a unit on average: at this many units per frame, as much as the paper's 5 %. */
 #define WELL_ABOVE 10
 #define SPEED_MAX_M_S (CREATE_OI_SPEED_MAX_MM_S * 1e-3)
-#define DRIVEN 1.1 /* times the greatest speed, or the one asked for: wheels of 10 % more than nominal */
-/* A base that is pushed goes no faster than a person in haste, for as long as nobody notices that it is not heard. */
-#define PUSHED_M_S 2.0
-#define PUSHED_MOST_S 0.5
 /* A frame's motion may be of so much more time: what adapters hold bytes back. */
 #define HELD_S (2 * PERIOD_S)
 #define UNIFORM_SIGMA 0.28867513459481287 /* of a number anywhere between two that lie 1 apart */
@@ -214,30 +212,22 @@ static struct odometry_units odometry_units(double distance_m, double angle_rad)
     return (struct odometry_units){distance_m / DISTANCE_UNIT_M, angle_rad / ANGLE_UNIT_RAD};
 }
 
-/* The way of the wheel that went further, m. */
-static double odometry_wheel_way(const struct create_odometry *odometry, double distance, double angle)
-{
-    return fabs(distance) + fabs(angle) * odometry->settings.wheel_base_m / 2;
-}
-
 /* Holds what a frame says against what wheels can do in its time. Nothing is left out: it is believed, in doubt, or
  * replaced and counted. */
 static void odometry_bound(struct create_odometry *odometry, struct create_step *step, const struct create_frame *frame)
 {
+    const struct create_reach reach = {SPEED_MAX_M_S, odometry->settings.wheel_base_m};
     const double time_s = (frame->missed + 1) * PERIOD_S + HELD_S;
     const double asked_m =
-        fmax(odometry_wheel_way(odometry, odometry->asked_m, odometry->asked_rad),
-             odometry_wheel_way(odometry, odometry_asked_distance(frame), odometry_asked_angle(odometry, frame)));
-    const double driven_m = DRIVEN * SPEED_MAX_M_S * time_s;
-    const double most_m =
-        PUSHED_M_S * fmin(time_s, PUSHED_MOST_S) + DRIVEN * fmin(asked_m / PERIOD_S, SPEED_MAX_M_S) * time_s;
-    const double way_m = odometry_wheel_way(odometry, step->distance, step->angle);
-    if (way_m > most_m) {
+        fmax(create_wheel_way(&reach, odometry->asked_m, odometry->asked_rad),
+             create_wheel_way(&reach, odometry_asked_distance(frame), odometry_asked_angle(odometry, frame)));
+    const enum create_verdict verdict = create_judge(&reach, step->distance, step->angle, asked_m / PERIOD_S, time_s);
+    if (verdict == CREATE_CARRIED) {
+        const double driven_m = create_driven_most(&reach, time_s);
         odometry->carried++;
-        *step =
-            (struct create_step){.loose_distance = driven_m, .loose_angle = driven_m / odometry->settings.wheel_base_m};
+        *step = (struct create_step){.loose_distance = driven_m, .loose_angle = driven_m / reach.wheel_base_m};
         odometry_add_estimate(odometry, step, 1, frame);
-    } else if (way_m > driven_m || frame->timing == CREATE_SURPLUS) {
+    } else if (verdict == CREATE_PUSHED || frame->timing == CREATE_SURPLUS) {
         step->loose_distance = fabs(step->distance);
         step->loose_angle = fabs(step->angle);
     }

@@ -21,7 +21,7 @@ ROOT = HOST.parent
 BLOCK = re.compile(r"/\* cffi: begin \*/\n(.*?)/\* cffi: end \*/", re.DOTALL)
 
 # What each library needs beside itself; the order is the linker's.
-LIBRARIES = {"whisker-nav": ["m"], "whisker": ["rt", "pthread"]}
+LIBRARIES = {"whisker-nav": ["m"], "whisker-create": ["m"], "whisker": ["rt", "pthread"]}
 # Headers that others build on come first: cffi wants a struct before its use.
 HEADERS = {
     "whisker-nav": [
@@ -53,6 +53,7 @@ HEADERS = {
             "planning/coverage.h",
         )
     ],
+    "whisker-create": [HOST / "create" / "include" / "create" / name for name in ("judge.h", "motion.h")],
     "whisker": [
         HOST / "libwhisker" / "include" / "whisker" / name
         for name in ("errors.h", "frame.h", "clock.h", "stats.h", "ring.h")
@@ -91,7 +92,8 @@ def nav_rooms() -> list[Path]:
 def wheel_ffi() -> cffi.FFI:
     """crunchbot._native from sources, without the part that needs libusb and hidapi: that is whiskerd's."""
     ffi = new_ffi()
-    files = [*sources(HOST / "nav", "nav"), *sources(HOST / "libwhisker", "whisker_core")]
+    files = [*sources(HOST / "nav", "nav"), *sources(HOST / "create", "create")]
+    files += sources(HOST / "libwhisker", "whisker_core")
     library = HOST / "libwhisker"
     ffi.set_source(
         "crunchbot._native",
@@ -99,7 +101,13 @@ def wheel_ffi() -> cffi.FFI:
         sources=[os.path.relpath(file, ROOT) for file in files],
         include_dirs=[
             str(path)
-            for path in (*(library / p for p in ("include", "src", "src/ring")), ROOT / "protocol/gen", *nav_rooms())
+            for path in (
+                *(library / p for p in ("include", "src", "src/ring")),
+                *(HOST / "create" / p for p in ("include", "src")),
+                ROOT / "protocol",
+                ROOT / "protocol/gen",
+                *nav_rooms(),
+            )
         ],
         define_macros=[("_GNU_SOURCE", None)],
         libraries=[library for needed in LIBRARIES.values() for library in needed],
@@ -131,7 +139,9 @@ def main(argv: list[str] | None = None) -> int:
     ffi.set_source(
         "_native",
         "\n".join(f'#include "{header}"' for header in ALL_HEADERS),
-        include_dirs=[str(path) for path in (HOST / "libwhisker" / "include", *nav_rooms())],
+        include_dirs=[
+            str(path) for path in (HOST / "libwhisker" / "include", HOST / "create" / "include", *nav_rooms())
+        ],
         extra_link_args=[*(str(archive) for archive in archives.values()), *HARDENED_LINK],
         libraries=[library for needed in LIBRARIES.values() for library in needed],
         extra_compile_args=["-O2", "-std=gnu11", *HARDENED_COMPILE],

@@ -14,6 +14,7 @@ extern "C" {
 #endif
 #pragma GCC visibility push(default)
 
+/* cffi: begin */
 #define CREATE_SCALES 3 /* scale errors: of distance, of angle, and heading drift per distance */
 
 /* One step: an arc of constant curvature. Lengths in m, angles in rad, anticlockwise positive. */
@@ -38,6 +39,7 @@ void create_motion_add(struct create_motion *motion, const struct create_step *s
 
 /* Covariance of (x, y, theta) to first order: m^2, m rad, rad^2; symmetric, positive semidefinite. */
 void create_motion_covariance(const struct create_motion *motion, double covariance[3][3]);
+/* cffi: end */
 
 #pragma GCC visibility pop
 #ifdef __cplusplus
