@@ -100,7 +100,8 @@ static int create_sim_read_options(int argc, char **argv, struct settings *setti
         .usage = "Usage: " PROGRAM " [OPTION...]\n"
                  "Emulates an iRobot Create on a pseudo-terminal, in real time, until SIGINT or SIGTERM. A driver "
                  "opens the\n"
-                 "printed path, or the link, as its serial port. Each change of mode is printed.\n",
+                 "printed path, or the link, as its serial port. Each change of mode is printed,\n"
+                 "and at the end where the robot stands.\n",
         .notes = "Example: " PROGRAM " --link /tmp/create --model 2\n"
                  "Example: " PROGRAM " --link /tmp/create --drop-remainder --lose-bytes 0.001\n"
                  "Example: " PROGRAM " --link /tmp/create --event bump-left@3s --event silent@10s+2s\n"
@@ -157,6 +158,13 @@ static void create_sim_report_mode(struct emulator *emulator)
     fflush(stdout);
 }
 
+/* Where the robot truly stands; on an open floor it begins at 500 m, 500 m, 0. */
+static void create_sim_report_pose(const struct emulator *emulator)
+{
+    const struct sim_pose pose = sim_world_pose(emulator->world);
+    printf("%.3f s: at %.6f m, %.6f m, %.6f rad\n", (double)emulator->ticks / TICKS_PER_S, pose.x, pose.y, pose.theta);
+}
+
 /* Bytes in, one tick, bytes out. */
 static void create_sim_step(struct emulator *emulator)
 {
@@ -200,6 +208,7 @@ static int create_sim_emulate(const struct settings *settings)
                settings->link ? settings->link : emulator.pty.path);
         fflush(stdout);
         create_sim_run(&emulator);
+        create_sim_report_pose(&emulator);
         create_pty_close(&emulator.pty);
         result = 0;
     } else {

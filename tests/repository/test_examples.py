@@ -36,6 +36,7 @@ OFFLINE = {
     "whisker export": "drive.parquet: 4000 frames, lanes lane0, lane1, lane2, lane3, lane4, lane5",
     "whisker radial follow": '"motion": "body whisk"',
     "whisker flash": "no bridge is connected",
+    "whisker base": "no table [base.ros2]; add it",
 }
 WITH_BRIDGE = {
     "whisker info": '"wire_version": ',

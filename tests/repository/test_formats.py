@@ -16,6 +16,7 @@ import pytest
 
 from crunchbot import occupancy
 from crunchbot import scene as scene_files
+from crunchbot.base_table import TOUCHES, BaseTable, Topics
 from crunchbot.bridge import nodes, ring
 from crunchbot.commands import info, radial, stream, texture
 from crunchbot.nav import localise, observations
@@ -65,10 +66,13 @@ def row_of(heading: str, first: str, table: int = 0, at: int = 1) -> set[str]:
     return names(row[at] for row in tables(heading)[table] if f"`{first}`" in row[0])
 
 
-def keys(value) -> set[str]:
-    """Of a TOML file: its keys and those of its tables, [[name]] for a list of tables."""
+def keys(value, inside: str = "") -> set[str]:
+    """Of a TOML file: its keys and those of its tables, [name] for a table and [[name]] for a list of tables."""
     found = set()
     for key, part in value.items():
+        if isinstance(part, dict):
+            found |= {f"[{inside}{key}]"} | keys(part, f"{inside}{key}.")
+            continue
         is_tables = isinstance(part, list) and part and isinstance(part[0], dict)
         found |= {f"[[{key}]]"} if is_tables else {key}
         for one in part if is_tables else ():
@@ -88,7 +92,9 @@ def folder(tmp_path_factory) -> Path:
     cells = np.zeros((10, 10), np.uint8)
     sensor = SensorTable("light", (0.0, 0.0), 0.0, 0.0, cells, 0.3, np.array([0.0, 1.0]), np.array([[1.0]]))
     prior = scene_files.Prior("gaussian", (-0.6, 3.36, 0.0), (0.1, 0.1, 0.1))
-    robot = dataclasses.replace(robot, sensors=(sensor,))
+    topics = Topics(command_type="Twist", touch={name: f"/{name}" for name in TOUCHES})
+    base = BaseTable(wheel_base_m=0.2, acceleration_m_s2=1.0, topics=topics)
+    robot = dataclasses.replace(robot, sensors=(sensor,), base=base)
     whole = scene_files.Scene(arena, robot, prior, origin=(-1.0, 2.0, 0.5))
     rows = made.observations
     rows = dataclasses.replace(rows, own=np.zeros((len(rows), 1)), point=np.full((*rows.normal.shape[:2], 3), np.nan))

@@ -59,6 +59,9 @@ ON_FILES = {
     "whisker radial follow whisk2.json contacts.csv": "body whisk",
     "whisker texture classify models/texture.json textures/ROUGH/left_ROUGH1.csv": "ROUGH",
     "whisker texture classify texture.json new.csv": "ROUGH",
+    "whisker base SCENE --trial": "no table [base.ros2]; add it",
+    "whisker base SCENE --socket base.sock": "no table [base.ros2]; add it",
+    "whisker robot SCENE --models MODELS --base ros2": "no [base.ros2]; add it",
     "whisker flash firmware/images/node.whex": "no bridge is connected",
     "whisker flash firmware/images/node.whex --dry-run": "no bridge is connected",
     "whisker robot SCENE --models MODELS --port /dev/ttyUSB0 --desktop --units units": "whisker-robot.target; next: ",
@@ -119,6 +122,7 @@ REASONS = {
         "whisker --print-completion bash",  # host/python/tests/commands/test_cli.py
         "whisker ros2 robot-run/scene --rmw cyclonedds",  # host/python/tests/robot/standard/test_robot_cyclonedds.py
         "whisker robot scenes/mine --simulated --desktop --seconds 120 --out try",  # tests/drills run it whole
+        "whisker robot --simulated --base ros2 --desktop",  # tests/chain/test_ros2_base.py
         "whisker view robot-run/robot.mcap",  # host/python/tests/view/test_view_playback.py
         "whisker-base --port /tmp/create --socket base.sock",  # host/python/tests/pilot/test_base_emulator.py
         "whisker scene from rosbag2_2026_11_28 --scene SCENE --out scenes/run",  # host/python/tests/robot/bags/test_robot_rosbags.py

@@ -36,6 +36,7 @@ COMMANDS = {
     "pilot": "the netbook's part of a robot: samples to wheel speeds and observations",
     "navigator": "pose and belief of a robot as its rows come, over the network",
     "mapper": "map and pose of a robot in an unknown arena as its rows come, over the network",
+    "base": "a base that speaks ROS 2 in place of a Create, behind the same socket as whisker-base",
     "ros2": "a running robot as a node of ROS 2, by Zenoh or Cyclone DDS, without ROS: standard messages, frames, /initialpose",
     "foxglove": "a running robot in Foxglove: pose, belief, whiskers, map, health; a pose set there is obeyed",
     "bag": "record everything a robot's processes say, for ROS 2 tools",
@@ -51,6 +52,7 @@ EXTRAS = {
     **dict.fromkeys(("record", "replay"), "record"),
     **dict.fromkeys(("try", "view"), "view"),
     **dict.fromkeys(("robot", "pilot", "navigator", "mapper", "bag", "pyro", "top"), "robot"),
+    "base": "cyclonedds",
     **{name: name for name in ("export", "ros2", "foxglove")},
     **dict.fromkeys(("localise", "map", "calibrate", "scene"), "scenes"),
 }
@@ -58,6 +60,7 @@ PACKAGE_EXTRAS = {"cyclonedds": "cyclonedds"}  # of a package that only one way 
 SHELLS = ("bash", "zsh", "tcsh")
 PARTS = ("pilot", "navigator", "mapper", "bag")  # processes that `robot` starts: not in the list of --help
 LAB_COMMANDS = ("bridge-sim", "scene")  # of the package crunchbot_lab
+OTHER_PLACES = {"base": "robot.rosbase.command"}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -134,7 +137,7 @@ def _fill(command: Parser, name: str) -> None:
 
 def command_module(name: str) -> ModuleType:
     """The module of a subcommand. UserError for one of the laboratory where that package is not installed."""
-    path = f"commands.{name.replace('-', '_')}"
+    path = OTHER_PLACES.get(name, f"commands.{name.replace('-', '_')}")
     if name in LAB_COMMANDS:
         return import_lab(path, f"whisker {name}")
     return importlib.import_module(f".{path}", __package__)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from . import observation
+from .base_table import CREATE, BaseTable, base_content, read_base
 from .files import UnreadableError
 from .images import nearest_levels, read_grey
 from .observation import Column, Layout, Quantity
@@ -79,6 +80,7 @@ class Robot:
     whiskers: tuple[Whisker, ...]  # in the file's order: lane 0 first
     sensors: tuple[SensorTable, ...] = ()  # of the user's own
     odometry_turn_sigma_rad: float | None = None  # of a row's turn, from a gyroscope; None: the relative one holds
+    base: BaseTable = CREATE
 
     def of_role(self, role: str) -> list[Whisker]:
         return [whisker for whisker in self.whiskers if whisker.role == role]
@@ -261,7 +263,8 @@ def write(path: str | Path, scene: Scene) -> None:
     turn = robot.odometry_turn_sigma_rad
     content |= {} if turn is None else {"odometry_turn_sigma_rad": turn}
     sensors = [write_sensor(folder, sensor) for sensor in robot.sensors]
-    _write(folder / ROBOT, content | {"whisker": list(map(_given, robot.whiskers)), "sensor": sensors})
+    whiskers = {"whisker": list(map(_given, robot.whiskers)), "sensor": sensors}
+    _write(folder / ROBOT, content | whiskers | base_content(robot.base))
     if prior is not None:
         _write(folder / PRIOR, _given(prior))
 
@@ -403,12 +406,13 @@ def _robot(table: Table, size_m: tuple[float, float]) -> Robot:
     radial = table.number("radial_sigma_m", TINY, LARGEST_M)
     whiskers = tuple(_whisker(entry) for entry in table.tables("whisker", WHISKERS_MOST))
     sensors = read_sensors(table, size_m)
+    base = read_base(table)
     table.done()
     names = [named.name for named in (*whiskers, *sensors)]
     for number, name in enumerate(names):
         if name in names[:number]:
             raise table.fail("whisker", f"has the name '{name}' twice; rename one")
-    return Robot(radius, odometry, radial, whiskers, sensors, turn)
+    return Robot(radius, odometry, radial, whiskers, sensors, turn, base)
 
 
 def _whisker(entry: Table) -> Whisker:

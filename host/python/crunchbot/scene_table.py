@@ -59,6 +59,13 @@ class Table(Fields):
             raise self.fail(key, f"has {len(value)} tables; {most} are the most")
         return [Table(self.path, self.source, item, key, nth) for nth, item in enumerate(value)]
 
+    def within(self, key: str) -> "Table":
+        """The table of this key, written as [key]."""
+        value = self.take(key)
+        if not isinstance(value, dict):
+            raise self.fail(key, f"must be a table; write it as [{key}]")
+        return Table(self.path, self.source, value)
+
     def done(self) -> None:
         for key in self.content:
             raise self.fail(key, "is unknown; remove it")

@@ -5,6 +5,7 @@ import dataclasses
 import pytest
 
 from crunchbot import scene as scenes
+from crunchbot.base_table import Topics
 
 ARENA_TOML = """\
 size_m = [1.0, 1.5]
@@ -181,3 +182,49 @@ def test_a_missing_file_or_folder_is_one_clear_line(folder):
         scenes.load(folder)
     with pytest.raises(scenes.SceneError, match="no such folder"):
         scenes.load(folder / "nowhere")
+
+
+BASE_TOML = """
+[base]
+wheel_base_m = 0.16
+wheel_most_m_s = 0.22
+wheel_step_m_s = 0.01
+acceleration_m_s2 = 1.5
+
+[base.ros2]
+odometry = "/wheels/odom"
+command_type = "TwistStamped"
+
+[base.ros2.touch]
+bump_left = "/bumper/left"
+"""
+
+
+def test_the_base_may_be_another_than_a_create(folder, tmp_path):
+    assert scenes.load(folder).robot.base.topics is None
+    (folder / "robot.toml").write_text(ROBOT_TOML + BASE_TOML)
+    base = scenes.load(folder).robot.base
+    assert (base.wheel_base_m, base.wheel_most_m_s, base.acceleration_m_s2) == (0.16, 0.22, 1.5)
+    assert base.topics == Topics("/cmd_vel", "/wheels/odom", "TwistStamped", touch={"bump_left": "/bumper/left"})
+    assert base.turn_most_rad_s == pytest.approx(2.75)
+    assert base.reached(0.22, -2.75) == pytest.approx((0.11, -1.375))
+    scenes.write(tmp_path / "again", scenes.load(folder))
+    assert scenes.load(tmp_path / "again") == scenes.load(folder)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("wheel_base_m = 0.16", "wheel_base_m = 160", "'wheel_base_m' must be a number from 0.001 to 5, not 160"),
+        ("wheel_base_m = 0.16", "", "'wheel_base_m' is missing; add it"),
+        ("0.22", "0.22\nmost = 1", "'most' is unknown; remove it"),
+        ('"/wheels/odom"', '"odom"', "'odometry' is 'odom', no topic; begin with /"),
+        ('"TwistStamped"', '"Stamped"', "'command_type' must be 'Twist' or 'TwistStamped'"),
+        ("bump_left", "bump_up", "'bump_up' is unknown; remove it"),
+        ("[base.ros2.touch]", "touch = 1", "'touch' must be a table; write it as \\[touch\\]"),
+    ],
+)
+def test_a_wrong_base_is_one_line(folder, old, new, line):
+    (folder / "robot.toml").write_text(ROBOT_TOML + BASE_TOML.replace(old, new, 1))
+    with pytest.raises(scenes.SceneError, match=line):
+        scenes.load(folder)

@@ -3,10 +3,12 @@
 import argparse
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from .. import scene as scenes
 from ..arguments import RING, add_output, add_zenoh_config, number_above, whole_number
+from ..base_table import BaseTable, Topics
 from ..errors import UserError
 from ..lab import import_lab
 from ..outputs import made, put
@@ -20,6 +22,7 @@ from ..robot.processes import holders, parts
 from ..robot.processes.logs import run_files, run_folder
 from ..robot.processes.supervisor import Supervisor
 from ..robot.processes.units import HELD, TARGET, Installed, units
+from ..robot.rosbase.signing import sign
 from ..robot.terminal import Terminal
 from ..stopping import stop_on_signals
 
@@ -28,12 +31,16 @@ DAY_S = 86400.0
 VIEW_PORT = 8028
 PORT = Path("/dev/ttyUSB0")
 SENSORS = {"bridge": "mlx90333", "pico": "tmag5170"}  # of a simulated robot's whiskers, by its board
+CREATE, ROS2 = "create", "ros2"
+SIMULATED_ROS2 = BaseTable(wheel_step_m_s=0.0285, topics=Topics())  # Create 2's wheels, which the simulation has
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", nargs="?", type=Path, metavar="SCENE", help="scene folder: arena, robot, prior")
     parser.add_argument("--models", type=Path, metavar="DIR", help="folder with texture.json and <whisker>.json")
     parser.add_argument("--create", type=int, choices=(1, 2), default=1, help="the base: iRobot Create")
+    text = "what the base speaks (default: as robot.toml says); simulated, ros2 is a Create behind /cmd_vel and /odom"
+    parser.add_argument("--base", choices=(CREATE, ROS2), help=text)
     parser.add_argument("--port", type=Path, default=PORT, help="the base's serial port")
     parser.add_argument("--ring", default=RING, metavar="NAME", help="whiskerd's ring")
     text = "use the whiskerd that runs, systemd's for instance, by its --ring"
@@ -100,7 +107,10 @@ def _write_units(arguments) -> int:
     """Units of pilot and desktop; whiskerd and whisker-base have theirs by `cmake --install`."""
     if arguments.simulated or not (arguments.scene and arguments.models):
         raise UserError("robot: --units without SCENE and --models, or with --simulated; give the real robot's")
-    load_models(arguments.models, scenes.load(arguments.scene).robot)
+    robot = scenes.load(arguments.scene).robot
+    load_models(arguments.models, robot)
+    if _speaks_ros2(arguments, robot):
+        raise UserError("robot: --units for a base of ROS 2: there is no unit; let one of yours run 'whisker robot'")
     address = (arguments.listen, arguments.first_port, arguments.zenoh_config and arguments.zenoh_config.resolve())
     meeting = Installed(arguments.ring, arguments.units, *address, port=arguments.port)
     scene, models = arguments.scene.resolve(), arguments.models.resolve()
@@ -128,8 +138,10 @@ def _look_first(arguments) -> None:
         raise UserError("robot: --board without --simulated: whiskerd finds out what is plugged in; leave it out")
     if not arguments.simulated and not (arguments.scene and arguments.models):
         raise UserError("robot: no SCENE or no --models; give both, or --simulated")
+    arguments.ros2 = arguments.base == ROS2
     if arguments.scene:
         scene = scenes.load(arguments.scene)
+        arguments.ros2 = _speaks_ros2(arguments, scene.robot)
         if arguments.models:
             load_models(arguments.models, scene.robot)
     read_config(arguments.zenoh_config)
@@ -139,18 +151,27 @@ def _look_first(arguments) -> None:
         holders.check_port(parts.LOOPBACK, arguments.view_port, "--view-port")
     if not arguments.no_daemon:
         holders.check_ring(arguments.ring)
-    if not arguments.simulated and (warning := holders.check_serial(arguments.port)):
+    if not (arguments.simulated or arguments.ros2) and (warning := holders.check_serial(arguments.port)):
         print(f"whisker: warning: {warning}", file=sys.stderr)
+
+
+def _speaks_ros2(arguments, robot: scenes.Robot) -> bool:
+    """UserError where robot.toml does not say how."""
+    if arguments.base == ROS2 and robot.base.topics is None:
+        raise UserError(
+            f"{arguments.scene / scenes.ROBOT}: --base ros2, but no [base.ros2]; add it (docs/another_base.md)"
+        )
+    return robot.base.topics is not None and arguments.base != CREATE
 
 
 def _table(arguments, meeting: parts.Meeting, files: dict[str, Path]) -> list:
     if arguments.simulated:
         body, simulated = _simulated(arguments, meeting, files)
         table = [parts.bridge(simulated, body, meeting)]
+        table += parts.simulated_base(body, meeting) if arguments.ros2 else []
     else:
-        body = parts.Body(
-            arguments.scene, arguments.models, arguments.create, arguments.port, arguments.seed, arguments.choose
-        )
+        robot = (arguments.scene, arguments.models, arguments.create, arguments.port, arguments.seed, arguments.choose)
+        body = parts.Body(*robot, arguments.ros2)
         table = []
     if arguments.desktop:
         view = None if arguments.no_view else arguments.view_port
@@ -174,8 +195,12 @@ def _simulated(arguments, meeting: parts.Meeting, files: dict[str, Path]) -> tup
         arguments.scene and str(arguments.scene), seed, sensor=SENSORS[arguments.board]
     )
     if arguments.scene is None:
+        if arguments.ros2:
+            scene = replace(scene, robot=replace(scene.robot, base=SIMULATED_ROS2))
         with made(folder, False, scenes.HELD) as fresh:
             scenes.write(fresh, scene)
+            if arguments.ros2:
+                sign(fresh, "the simulation, whose base has a time-out")
     out.mkdir(parents=True, exist_ok=True)
     put(files["flat"], scene.flat(start), overwrite=False)
     models = arguments.models or out / "models"
@@ -190,6 +215,7 @@ def _simulated(arguments, meeting: parts.Meeting, files: dict[str, Path]) -> tup
             fresh.mkdir()
             result = kept.learn_or_copy(fresh, scene, seed, lambda: done.update(1))
         print(f"models: {result}", flush=True)
-    body = parts.Body(folder, models, arguments.create, meeting.serial, seed, arguments.choose)
+    create = 2 if arguments.ros2 else arguments.create
+    body = parts.Body(folder, models, create, meeting.serial, seed, arguments.choose, arguments.ros2)
     reported = (arguments.level, seed, arguments.seconds, arguments.pace, files["truth"], files["wheels"])
     return body, parts.Simulated(files["flat"], *reported)

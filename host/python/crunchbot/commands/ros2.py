@@ -1,16 +1,16 @@
 """`whisker ros2`: a running robot as a node of ROS 2 (crunchbot.robot.ros2)."""
 
 import argparse
-import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import scene as scenes
-from ..arguments import warn, whole_number
+from ..arguments import warn
 from ..errors import UserError
 from ..robot.network.options import NAVIGATOR_ENDPOINT, PILOT_ENDPOINT, add_link, open_link
-from ..robot.ros2 import LOCALHOST, ROUTER, SUBNET
+from ..robot.ros2 import LOCALHOST, ROUTER
+from ..robot.ros2.options import add_domain, reach_of
 from ..robot.standard.view import StandardView
 from ..stopping import stop_on_signals
 
@@ -18,22 +18,16 @@ if TYPE_CHECKING:
     from ..robot.standard.outlet import Outlet
 
 EXAMPLE = "whisker ros2 robot-run/scene"
-DOMAIN_VARIABLE, DOMAIN_MOST = "ROS_DOMAIN_ID", 232
 ZENOH, CYCLONE = "zenoh", "cyclonedds"
-RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE", help="the robot's scene folder")
     text = "which implementation of ROS 2's middleware reads it"
     parser.add_argument("--rmw", choices=(ZENOH, CYCLONE), default=ZENOH, help=text)
-    domain = os.environ.get(DOMAIN_VARIABLE) or "0"
-    text = f"of ROS 2 (default: {DOMAIN_VARIABLE}, or 0)"
-    parser.add_argument("--domain", type=whole_number(0, DOMAIN_MOST), default=domain, metavar="N", help=text)
     text = f"of rmw_zenoh, tcp/HOST:PORT (default: {ROUTER})"
     parser.add_argument("--router", metavar="ENDPOINT", help=text)
-    text = f"who finds it by Cyclone DDS: this machine, or its networks (default: {RANGE_VARIABLE}, or {LOCALHOST})"
-    parser.add_argument("--range", choices=(LOCALHOST, SUBNET), help=text)
+    add_domain(parser)
     add_link(parser, [], [PILOT_ENDPOINT, NAVIGATOR_ENDPOINT])
     parser.set_defaults(run=run)
 
@@ -64,9 +58,7 @@ def _zenoh_node(view: StandardView, arguments: argparse.Namespace) -> "Outlet":
 
 
 def _cyclone_node(view: StandardView, arguments: argparse.Namespace) -> "Outlet":
-    reach = arguments.range or (os.environ.get(RANGE_VARIABLE) or LOCALHOST).lower()
-    if reach not in (LOCALHOST, SUBNET):
-        raise UserError(f"{RANGE_VARIABLE}: '{reach}' is not served; give --range {LOCALHOST} or {SUBNET}")
+    reach = reach_of(arguments)
     from ..robot.ros2.rmw_cyclonedds import CycloneNode
 
     node = CycloneNode(view, arguments.robot, arguments.domain, reach)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
+from ..base_table import BaseTable
 from ..observation import DISTANCE, NORMAL, ODOMETRY, TIME
 from ..scene import Robot, Whisker
 from .observations import Observations
@@ -16,9 +17,7 @@ ROW_S = 0.1
 APART = 2.5  # rows: where so many are between two, two are missing (gap.c)
 MISSING_MOST = 10  # rows, after which nothing is known of the robot's way (gap.c)
 ROW_MOST_M, ROW_MOST_RAD = 1.0, math.pi  # what intake.c takes in one row: the base's speed, and room for a whisk
-# A Create's wheels turn at 0.5 m/s at most, 235 mm apart. The slack is for reports that come a little late.
-MOST_M_S, MOST_RAD_S = 0.5, 4.3
-SLACK_M, SLACK_RAD = 0.05, 0.1
+SLACK_M, SLACK_RAD = 0.05, 0.1  # beyond what the base can do: for reports that come a little late
 LENGTH_SLACK = 1.5  # of a whisker's length, within which a distance is read (range_model.c)
 ACCURACY = 0.87  # of windows (texture_model.c)
 LEFT_MOST = 0.05  # share of rows or cells that may be left out without a word
@@ -34,7 +33,7 @@ def row_faults(rows: Observations, robot: Robot) -> list[str]:
     if all(np.isnan(values).all() for values in read):
         return ["no row has a reading; all answers are the odometry's" if len(rows) else "no rows; record some"]
     with np.errstate(invalid="ignore", over="ignore"):  # of infinite cells
-        return [*_times(rows), *_motions(rows), *_alike(_columns(rows, robot))]
+        return [*_times(rows), *_motions(rows, robot.base), *_alike(_columns(rows, robot))]
 
 
 def _alike(lines: Iterable[str]) -> Iterator[str]:
@@ -105,7 +104,7 @@ def _times(rows: Observations) -> Iterator[str]:
         yield f"'{TIME}': {missing} rows are missing among {count}, their motion is assumed; look what loses them"
 
 
-def _motions(rows: Observations) -> list[str]:
+def _motions(rows: Observations, base: BaseTable) -> list[str]:
     """By what the base can do in the time since the row before that moved, for a whisk's motion is held back."""
     number, moved, carried = np.arange(len(rows)), rows.odometry.any(axis=1), np.isinf(rows.odometry).any(axis=1)
     since = np.concatenate([[-1], np.maximum.accumulate(np.where(moved, number, -1))[:-1]])
@@ -113,7 +112,7 @@ def _motions(rows: Observations) -> list[str]:
     if _is_usual(_period(rows)):
         seconds = np.where(since < 0, seconds, np.fmax(seconds, rows.t_s - rows.t_s[since]))
     beyond, lines, known = np.zeros(len(rows), bool), [], np.where(carried[:, None], 0.0, rows.odometry)
-    far, turned = MOST_M_S * seconds + SLACK_M, MOST_RAD_S * seconds + SLACK_RAD
+    far, turned = base.wheel_most_m_s * seconds + SLACK_M, base.turn_most_rad_s * seconds + SLACK_RAD
     for columns, units, most in ((slice(0, 2), METRES, far), (slice(2, 3), RADIANS, turned)):
         part = known[:, columns]
         size, change = (np.abs(np.hypot.reduce(p, axis=1)) for p in (part, np.diff(part, axis=0)))

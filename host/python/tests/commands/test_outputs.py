@@ -30,7 +30,7 @@ TRIED_ELSEWHERE = {  # by what they share with those of writers.cases
 # Every other argument that is a path, or may be one: what is read, or what only this run's process writes (its own tests: journal,
 # checkpoint, run folder). An argument that is new is written down here, or is made by `add_output`.
 INPUTS = {
-    "doctor --rest", "scene from --topics", "scene from --scene", "view --topics", "bridge-sim --fault", "bridge-sim --scene", "bag --scene", "bag --zenoh-config", "calibrate --nodes", "calibrate --scene",
+    "base scene", "base --socket", "doctor --rest", "scene from --topics", "scene from --scene", "view --topics", "bridge-sim --fault", "bridge-sim --scene", "bag --scene", "bag --zenoh-config", "calibrate --nodes", "calibrate --scene",
     "export file", "flash image", "flash --uf2", "foxglove scene",  "foxglove --zenoh-config", "localise scene", "localise --map", "map scene",
     "mapper scene", "mapper --journal", "mapper --zenoh-config", "navigator scene", "navigator --checkpoint",
     "navigator --zenoh-config", "pilot scene", "pilot --models", "pilot --nodes", "pilot --base", "pilot --simulation",

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from ...nav.faults import MOST_M_S, MOST_RAD_S, SLACK_M, SLACK_RAD
+from ...base_table import CREATE
+from ...nav.faults import SLACK_M, SLACK_RAD
 from ...observation import NORMAL, Quantity, normal, parse
 from ...scene import Scene
 from .inbox import Received
@@ -18,8 +19,9 @@ class RowChecks:
     """Judges the rows of an inbox, in their order; other messages pass."""
 
     def __init__(self, scene: Scene | None = None):
-        """scene: whose cells every row must have; None: of any robot."""
+        """scene: whose cells every row must have, and whose base moves; None: of any robot, on a Create."""
         self._wanted, self._whiskers = (columns(scene), _whiskers(scene)) if scene else (frozenset(), ())
+        self._base = scene.robot.base if scene else CREATE
         self._last: Received | None = None
         self._moved_ns = 0  # stamp of the newest row with any motion
 
@@ -62,7 +64,8 @@ class RowChecks:
             return f"field motion: not what leads from the last row's pose to this one's; {REMEDIES[1]}"
         seconds = self._seconds(last, row)
         far, turned = math.hypot(*moved[:2]), abs(moved[2])
-        if far > MOST_M_S * seconds + SLACK_M or turned > MOST_RAD_S * seconds + SLACK_RAD:
+        most_m, most_rad = self._base.wheel_most_m_s * seconds, self._base.turn_most_rad_s * seconds
+        if far > most_m + SLACK_M or turned > most_rad + SLACK_RAD:
             return f"field pose: {far:.3g} m and {turned:.3g} rad in {seconds:.3g} s; {REMEDIES[1]}"
         return ""
 

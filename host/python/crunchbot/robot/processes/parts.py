@@ -14,6 +14,7 @@ FIRST_PORT = 7457  # of three: supervisor, pilot, navigator; the latter two are 
 LOOPBACK = "127.0.0.1"
 BRIDGE, NAVIGATOR, MAPPER = "bridge", "navigator", "mapper"
 
+SIMULATED_BASE = "crunchbot_lab.simulation.ros2_base"
 BASE_STEADY_S = 1.0  # a base that is started again stops the wheels: it comes at once
 
 # Inside the simulated bridge's umockdev the device is seen by a process that has these variables: they are left in file $0. At
@@ -51,6 +52,11 @@ class Places:
     @property
     def base(self) -> Path:
         return self.folder / "base.sock"
+
+    @property
+    def create(self) -> Path:
+        """Of the simulated Create that stands in for a base of ROS 2."""
+        return self.folder / "create.sock"
 
     @property
     def simulation(self) -> Path:
@@ -97,7 +103,7 @@ class Meeting(Places):
 
 @dataclass(frozen=True)
 class Body:
-    """The robot: its scene folder, its models, and the base, Create 1 or 2, on a serial port."""
+    """The robot: its scene folder, its models, and the base: Create 1 or 2 on a serial port, or one of ROS 2."""
 
     scene: Path
     models: Path
@@ -105,6 +111,7 @@ class Body:
     port: Path
     seed: int  # of the random turns
     choose: str = RANDOM  # what takes their place, of `policy`
+    ros2: bool = False  # the base is that of robot.toml, by ROS 2; a simulated one is the Create in its place
 
 
 def whisker(command: str) -> list[str]:
@@ -125,8 +132,17 @@ class Table:
         return [self.find("whiskerd"), "--ring", self.places.ring]
 
     def base(self) -> list:
-        paths = ["--port", self.body.port, "--socket", self.places.base]
+        if self.body.ros2:
+            return [*whisker("base"), self.body.scene, "--socket", self.places.base]
+        return self.create(self.places.base)
+
+    def create(self, socket: Path) -> list:
+        paths = ["--port", self.body.port, "--socket", socket]
         return [self.find("whisker-base"), *paths, "--model", self.body.create]
+
+    def simulated_base(self) -> list:
+        """What makes a base of ROS 2 of the simulated Create."""
+        return [sys.executable, "-m", SIMULATED_BASE, self.body.scene, "--base", self.places.create]
 
     def pilot(self) -> list:
         body = self.body
@@ -167,9 +183,22 @@ def netbook(body: Body, meeting: Meeting, awaited: str | None) -> list[Program]:
     pilot = [*table.pilot(), "--base", meeting.base, "--listen", meeting.endpoint(1), "--connect", meeting.endpoint(2)]
     pilot += [*meeting.options, *(["--await", awaited] if awaited else [])]
     return [
-        Program.of("base", [*table.base(), "--wait"], moves=True, fed=True, steady_s=BASE_STEADY_S),
+        _base_program("base", table.base(), body.ros2),
         Program.of("pilot", pilot, reports=True, moves=True),
     ]
+
+
+def _base_program(name: str, command: list, ros2: bool) -> Program:
+    """ros2: its driver watches its guard, which feeds no watchdog."""
+    waiting = [] if ros2 else ["--wait"]
+    return Program.of(name, command + waiting, moves=True, fed=not ros2, steady_s=BASE_STEADY_S)
+
+
+def simulated_base(body: Body, meeting: Meeting) -> list[Program]:
+    """A base of ROS 2 in place of the simulated Create."""
+    table = Table(body, meeting)
+    create = _base_program("create", table.create(meeting.create), ros2=False)
+    return [create, Program.of("simulated-base", table.simulated_base(), serves=True)]
 
 
 def desktop(

@@ -105,26 +105,37 @@ def quality(schema: str, is_kept: bool) -> Qos:
     )
 
 
+def participate(domain: int, reach: str) -> tuple[Domain, DomainParticipant]:
+    """Both are to be kept. DdsError: Cyclone DDS refuses its configuration, or finds no network."""
+    try:
+        return Domain(domain, _configuration(reach)), DomainParticipant(domain, Qos(Policy.Userdata(b"enclave=/;")))
+    except DDSException:  # Cyclone DDS has printed why
+        text = f"mend {CONFIGURATION}, or choose another --domain or --range"
+        raise DdsError(f"Cyclone DDS does not start, for the reason above; {text}") from None
+
+
+def topic_of(participant: DomainParticipant, name: str, schema: str) -> Topic:
+    """Of messages that are given, and come, as CDR."""
+    topic = Topic(participant, name, idl_type(schema))
+    topic.data_type = Carrier
+    return topic
+
+
 class CycloneNode(Outlet):
     """The node crunchbot_<robot>. DdsError: Cyclone DDS refuses its configuration, or finds no network."""
 
     def __init__(self, view: StandardView, robot: str, domain: int, reach: str):
         super().__init__(view, robot)
         self.name = node_name(robot)
-        try:
-            self._domain = Domain(domain, _configuration(reach))
-            self._participant = DomainParticipant(domain, Qos(Policy.Userdata(b"enclave=/;")))
-        except DDSException:  # Cyclone DDS has printed why
-            text = f"mend {CONFIGURATION}, or choose another --domain or --range"
-            raise DdsError(f"Cyclone DDS does not start, for the reason above; {text}") from None
+        self._domain, self._participant = participate(domain, reach)
         self._writers: dict[str, DataWriter] = {}
         self._graph = self._writer(GRAPH_TOPIC, GRAPH_SCHEMA, True)
-        poses = self._topic(_topic_name(POSE_TOPIC), POSE_SCHEMA)
+        poses = topic_of(self._participant, topic_name(POSE_TOPIC), POSE_SCHEMA)
         self._poses = DataReader(self._participant, poses, quality(POSE_SCHEMA, False))
         self.open_all()
 
     def open(self, topic: str, schema: str) -> None:
-        self._writers[topic] = self._writer(_topic_name(topic), schema, topic in LATCHED)
+        self._writers[topic] = self._writer(topic_name(topic), schema, topic in LATCHED)
         self._describe()
 
     def send(self, topic: str, data: Callable[[], bytes], wall_ns: int) -> bool:
@@ -153,12 +164,7 @@ class CycloneNode(Outlet):
         self._graph = self._poses = self._participant = self._domain = None
 
     def _writer(self, name: str, schema: str, is_kept: bool) -> DataWriter:
-        return DataWriter(self._participant, self._topic(name, schema), quality(schema, is_kept))
-
-    def _topic(self, name: str, schema: str) -> Topic:
-        topic = Topic(self._participant, name, idl_type(schema))
-        topic.data_type = Carrier
-        return topic
+        return DataWriter(self._participant, topic_of(self._participant, name, schema), quality(schema, is_kept))
 
     def _describe(self) -> None:
         """Says which endpoints are this node's."""
@@ -175,7 +181,7 @@ class CycloneNode(Outlet):
         self._graph.write(Carrier(encode(message)))
 
 
-def _topic_name(topic: str) -> str:
+def topic_name(topic: str) -> str:
     return f"rt{ros_name(topic)}"
 
 

@@ -163,9 +163,10 @@ def wait_for(find: Callable[[], Any], what: str) -> Any:
 class Desk:
     """A participant, and what it sees of the others."""
 
-    def __init__(self, tag: str):
-        self._domain = Domain(DOMAIN, f"{CONFIGURATION},{apart(tag)}")
-        self._participant = DomainParticipant(DOMAIN)
+    def __init__(self, tag: str, domain: int = DOMAIN):
+        """domain: a process can have each but once."""
+        self._domain = Domain(domain, f"{CONFIGURATION},{apart(tag)}")
+        self._participant = DomainParticipant(domain)
         self._participants = BuiltinDataReader(self._participant, BuiltinTopicDcpsParticipant)
         self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
 
