@@ -1,6 +1,7 @@
 """The simulated base that speaks ROS 2, by real DDS: from a client's orders to the emulated Create's wheels and back; and a
 whole robot on it."""
 
+import contextlib
 import csv
 import math
 import os
@@ -60,14 +61,22 @@ class Robot:
         (self.scene / "robot.toml").write_text(ROBOT + TOUCH)
         (self.scene / "base_stops.toml").write_text(SIGNED)
         self.variables = os.environ | {VARIABLE: apart(str(uuid.uuid4())), "ROS_DOMAIN_ID": str(DOMAIN)}
-        self._all = []
+        self._all, self._open = [], contextlib.ExitStack()
+        try:
+            self._begin(folder, port, socket, emulator, rate)
+        except BaseException:
+            self.close()
+            raise
+
+    def _begin(self, folder, port, socket, emulator, rate: float) -> None:
         self._start("Create 2", program("whisker-create-sim"), "--model", 2, "--link", port, *emulator)
         self._start("", program("whisker-base"), "--model", 2, "--port", port, "--socket", socket)
         module = ("-m", "crunchbot_lab.simulation.ros2_base")
         words = (self.scene, "--base", socket, "--rate", rate)
         self.base = self._start("simulated base: is up", sys.executable, *module, *words)
-        self._driver = Running(self.scene, self, folder / "base.sock")
-        self.client, self.create = self._driver.ready(), Base(str(socket))
+        driver = self._open.enter_context(contextlib.closing(Running(self.scene, self, folder / "base.sock")))
+        self.client = self._open.enter_context(driver.ready())
+        self.create = self._open.enter_context(Base(str(socket)))
 
     def _start(self, first: str, *words: object) -> subprocess.Popen:
         """A process; it has printed this line when this returns."""
@@ -77,9 +86,7 @@ class Robot:
         return process
 
     def close(self) -> None:
-        self.client.close()
-        self.create.close()
-        self._driver.close()
+        self._open.close()
         for process in reversed(self._all):
             process.terminate()
             process.communicate(timeout=END_S)

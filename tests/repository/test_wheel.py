@@ -19,6 +19,7 @@ from crunchbot import __version__
 PRODUCT = (
     "host/python",
     "host/libwhisker",
+    "host/create",
     "host/nav",
     "protocol",
     "pyproject.toml",

@@ -1,4 +1,4 @@
-"""The robot's base: client of `whisker-base`, which drives an iRobot Create or its emulator.
+"""The robot's base: client of `whisker-base`, which drives an iRobot Create, and of `whisker base`, for one of ROS 2.
 
 One ASCII message per packet over a Unix socket, one answer each; docs/create.md has them all. The first client that drives
 commands; any number may observe. A commander that is silent for 0.3 s, or goes, finds the wheels stopped; after 1 s another

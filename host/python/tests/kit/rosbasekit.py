@@ -1,5 +1,6 @@
 """A base of ROS 2 for tests: scripted, with types of its own (rosdesk), and the driver `whisker base` on it."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -173,8 +174,9 @@ class Running:
         self._beating.start()
 
     def _beat(self) -> None:
-        while self._heart >= 0 and not self._still.wait(0.05):
-            os.write(self._heart, b".")
+        with contextlib.suppress(BrokenPipeError):  # who is beaten for has been killed
+            while self._heart >= 0 and not self._still.wait(0.05):
+                os.write(self._heart, b".")
 
     def fall_silent(self) -> None:
         """The supervisor hangs."""
