@@ -23,7 +23,7 @@ enum create_verdict create_judge(const struct create_reach *reach, double distan
     const double way_m = create_wheel_way(reach, distance, angle);
     const double pushed_m =
         PUSHED_M_S * fmin(time_s, PUSHED_MOST_S) + DRIVEN * fmin(asked_m_s, reach->speed_m_s) * time_s;
-    return !(way_m <= pushed_m)                           ? CREATE_CARRIED
+    return !(way_m <= pushed_m)                        ? CREATE_CARRIED
            : way_m > create_driven_most(reach, time_s) ? CREATE_PUSHED
-                                                          : CREATE_DRIVEN;
+                                                       : CREATE_DRIVEN;
 }

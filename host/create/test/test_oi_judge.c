@@ -34,7 +34,8 @@ static void test_what_is_pushed_adds_to_what_was_asked_for(void **state)
     (void)state;
     assert_int_equal(create_judge(&reach, 0.221, 0, 0.2, 0.1), CREATE_PUSHED);
     assert_int_equal(create_judge(&reach, 0.223, 0, 0.2, 0.1), CREATE_CARRIED);
-    assert_int_equal(create_judge(&reach, 0.245, 0, 9, 0.1), CREATE_CARRIED); /* no wheel is asked for more than it can */
+    assert_int_equal(create_judge(&reach, 0.245, 0, 9, 0.1),
+                     CREATE_CARRIED); /* no wheel is asked for more than it can */
 }
 
 static void test_nobody_pushes_for_longer_than_half_a_second(void **state)

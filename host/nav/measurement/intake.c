@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A base drives at most 5 m/s (crunchbot/base_table.py), for 0.1 s or what a late report adds, and a body whisk, which a
- * row may carry whole, is on the spot; beyond this a cell is a mistake. */
+/* A base drives at most 5 m/s (crunchbot/base_table.py), for 0.1 s or what a late report adds, and a body whisk, which
+ * a row may carry whole, is on the spot; beyond this a cell is a mistake. */
 static const double ODOMETRY_MOST_M = 1.0;
 
 int nav_intake_init(struct nav_intake *in, const struct nav_problem *problem)
