@@ -37,7 +37,6 @@ HEADERS = {
             "touch/contact/contact_filter.h",
             "touch/texture/texture_features.h",
             "touch/texture/texture_classifier.h",
-            "touch/texture/texture_change.h",
             "touch/texture/texture_clean.h",
             "touch/texture/texture_novelty.h",
             "touch/texture/texture_stream.h",

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import level0
 import numpy as np
 import pytest
-from models import CHANNELS, FEATURES, LENGTH, LIMITS, change, classifier, model, novelty
+from models import CHANNELS, FEATURES, LENGTH, LIMITS, classifier, model, novelty
 from rings import ring_name
 
 import crunchbot
@@ -27,7 +27,6 @@ from crunchbot.touch.contact_filter import ContactFilter
 from crunchbot.touch.radial.model import RadialModel, peak
 from crunchbot.touch.radial.shape import Contact as Whisk
 from crunchbot.touch.radial.shape import shape_of
-from crunchbot.touch.texture.change import Change
 from crunchbot.touch.texture.classifier import Classifier, blocks_of, plain_features
 from crunchbot.touch.texture.model import TextureModel
 from crunchbot.touch.texture.novelty import Novelty
@@ -49,7 +48,6 @@ OWN = {
     "signals.mechanics.drag",
 }
 ROWS, SHAPES = 12, lib.nav_texture_shape_count(LENGTH)
-CHANGE_RULE = {"steady": (0, 1), "apart": (0, 1), "weight": (0, 1), "bias": (0,)}
 
 
 class Case(NamedTuple):
@@ -142,31 +140,15 @@ CASES = {
         {"t_s": (0,), "samples": (0,), "whisk_rad_s": (0,), "reported_rad_s": (0,)},
     ),
     "touch.texture.novelty.Novelty.native": of_part(
-        novelty(), Novelty.native, turn=(0, 1), mean=(1,), recording=(0, 1), noise=(0,), limit=(0,)
+        novelty(), Novelty.native, turn=(0, 1), mean=(1,), row=(0,), limit=(0,)
     ),
-    "touch.texture.novelty.Novelty.scores": of_one(novelty().scores, "features", np.zeros((3, FEATURES)), 1),
+    "touch.texture.novelty.Novelty.distances": of_one(novelty().distances, "features", np.zeros((3, FEATURES)), 1),
     "touch.texture.spectral.forward": of_one(lambda loglik: forward(loglik, 1.0, 0.1), "loglik", np.zeros((4, 3))),
-    "touch.texture.change.Change.native": of_part(
-        change(),
-        Change.native,
-        floor=(0,),
-        **{f"{at}{n}": axes for at in ("", "edge_") for n, axes in CHANGE_RULE.items()},
-    ),
-    "touch.texture.change.Change.ratios": of_one(change().ratios, "samples", NOISE, 1),
     "touch.texture.classifier.Classifier._make": of_part(
-        classifier(),
-        Classifier._make,
-        floor=(0,),
-        centre=(0,),
-        scale=(0,),
-        weight=(0, 1),
-        bias=(0,),
-    ),
-    "touch.texture.classifier.Classifier.expand": of_one(
-        classifier().expand, "windows", np.zeros((2, LENGTH, CHANNELS)), 1, 2
+        classifier(), Classifier._make, floor=(0,), weight=(0, 1), bias=(0,)
     ),
     "touch.texture.classifier.plain_features": Case(
-        lambda **given: plain_features(given["windows"], False, given["floor"], 0, given["shape"]),
+        lambda **given: plain_features(given["windows"], given["floor"], given["shape"]),
         {"windows": np.zeros((2, LENGTH, CHANNELS)), "floor": np.ones(CHANNELS), "shape": np.zeros(SHAPES)},
         {"windows": (2,), "floor": (0,), "shape": (0,)},
     ),

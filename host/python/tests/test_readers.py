@@ -162,7 +162,7 @@ def test_a_radial_model_with_nonsense_is_one_line_that_names_the_field(tmp_path,
     refused(tmp_path / "m.json", LINE | {field: value}, radial.load, field)
 
 
-@pytest.mark.parametrize("field", ["rate_hz", "window_ms", "temper", "doubt", "hazard"])
+@pytest.mark.parametrize("field", ["rate_hz", "window_ms", "doubt", "hazard"])
 @pytest.mark.parametrize("value", [-1, 1e308, "1", None, True, [1.0], float("nan")])
 def test_a_texture_model_with_nonsense_is_one_line_that_names_the_field(tmp_path, field, value):
     model().save(tmp_path / "m.json")
@@ -184,7 +184,7 @@ def test_a_texture_model_with_nonsense_is_one_line_that_names_the_field(tmp_path
         ("classifiers", {}),
         ("classifiers", [1]),
         ("limits", [1]),
-        ("change", 3),
+        ("novelty", 3),
     ],
 )
 def test_parts_of_a_texture_model_of_another_type_are_named(tmp_path, field, value):

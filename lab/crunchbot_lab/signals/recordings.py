@@ -35,6 +35,7 @@ POST_M = 0.03  # side of the square post
 TOWARDS_RAD = math.radians(10.0)  # between the whisker at first contact and the post's face that runs along it
 ROBOT_LINES = r"(body_|texture_|object_|mechanics |sensor |batch )"  # of a scene's flat text
 BENCH_M = 4.0  # side of the empty arena around it
+LEAD_M = 0.6  # before a drive is recorded: tips pass a border, are let go where it holds them, and turn about beside it
 
 
 class RadialContact(NamedTuple):
@@ -47,10 +48,15 @@ class RadialContact(NamedTuple):
 def surface_drive(
     flat: str, surface: str, speed_m_s: float, seconds: float, seed: int, moves: Sequence = MOVES
 ) -> dict[str, np.ndarray]:
-    """Drive the robot of a scene over one surface: counts (n, 2) of each texture whisker by name."""
-    side = 4.0 + 2.0 * speed_m_s * seconds  # no wall within reach
-    start = (side / 2, side / 2, 0.0)
-    world = World(_bench(flat, side, surface, start), seed)
+    """Drive the robot of a scene over one surface: counts (n, 2) of each texture whisker by name.
+
+    The tips begin on another tile of it: as in an arena, the floor they sweep is not as high as the one they stood on first.
+    """
+    side = BENCH_M + 4.0 * (LEAD_M + speed_m_s * seconds)  # neither a wall nor another border within reach
+    start = (side / 2, side / 4, 0.0)
+    world = World(_bench(flat, side, surface, start, tiles=2), seed)
+    world.drive(speed_m_s, 0.0)
+    world.run(round(LEAD_M / speed_m_s / TICK_S))
     total, parts, done = round(seconds / TICK_S), [], 0
     while done < total:
         for share, omega, duration in moves:
@@ -186,10 +192,11 @@ def _post_scene(flat: str, whisker: str, radius_m: float) -> tuple[str, int]:
     return scene + f"obstacle {corner_x - POST_M!r} {low_y!r} {corner_x!r} {high_y!r}\n", side
 
 
-def _bench(flat: str, side_m: float, surface: str, start: tuple[float, float, float]) -> str:
-    """The robot of a scene in an empty square arena with one surface."""
+def _bench(flat: str, side_m: float, surface: str, start: tuple[float, float, float], tiles: int = 1) -> str:
+    """The robot of a scene in an empty square arena with one surface, so many tiles a side."""
     robot = [line for line in flat.splitlines() if re.match(ROBOT_LINES, line)]
-    arena = [f"size_m {side_m!r} {side_m!r}", f"tile_m {side_m!r}", f"texture {surface}", f"floor {surface[0]}"]
+    arena = [f"size_m {side_m!r} {side_m!r}", f"tile_m {side_m / tiles!r}", f"texture {surface}"]
+    arena += [f"floor {tiles * surface[0]}"] * tiles
     return "\n".join([*arena, *robot, "start " + " ".join(map(repr, start))]) + "\n"
 
 

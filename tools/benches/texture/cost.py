@@ -36,9 +36,9 @@ def cost() -> dict:
         pairs = list(zip(label["test"], (decide(model, w)[0] for w in cut["test"]), strict=True))
         out[name] = {"error": 1.0 - summary(pairs)["accuracy"], "us": own_time(model, cut["test"])}
     floor = known[METHODS[1]].classifiers[0].floor
-    features = {f"{s}_features": plain_features(cut[s], False, floor) for s in cut}
+    features = {f"{s}_features": plain_features(cut[s], floor) for s in cut}
     start = time.perf_counter_ns()
-    plain_features(cut["test"], False, floor)
+    plain_features(cut["test"], floor)
     reduce_us = (time.perf_counter_ns() - start) / 1e3 / len(cut["test"])
     for name, peer in peers(cut | features | {f"{s}_label": v for s, v in label.items()}).items():
         out[name] = {"error": peer["error"], "us": peer["us"] + (0.0 if "kernels" in name else reduce_us)}

@@ -84,7 +84,7 @@ def peer_decisions(kept: list, held: list, names: list[str], window: int, floor:
     for part, runs in (("train", kept), ("test", held)):
         cut = [windows_of(x, window) for _, x in runs]
         arrays[part] = np.concatenate(cut)
-        arrays[f"{part}_features"] = plain_features(arrays[part], False, floor)
+        arrays[f"{part}_features"] = plain_features(arrays[part], floor)
         arrays[f"{part}_label"] = np.repeat([names.index(n) for n, _ in runs], list(map(len, cut)))
         arrays[f"{part}_run"] = np.repeat(np.arange(len(runs)), list(map(len, cut)))
     truth = arrays["test_label"]

@@ -3,13 +3,12 @@
 import numpy as np
 
 from crunchbot.touch.texture.model import TextureModel, classify
-from crunchbot.touch.texture.spectral import SpectralModel
 from crunchbot.touch.texture.train import calibration_error, train
 
 from .trials import LOOK, TICK_S
 
 HZ, WINDOW = 2000.0, 200
-INSIDE_M, BORDER_S, WRONG_S = 0.05, 0.15, 0.1
+INSIDE_M, WRONG_S = 0.05, 0.1
 REFUSED = 0.1  # share of decisions that "unknown" may cost
 REFUSED_MOST, SHRINK = 0.08, 0.3  # of windows of trained surfaces; share of the diagonal in a covariance
 METHODS = ("naive Bayes (paper)", "default")
@@ -41,7 +40,6 @@ def summary(pairs: list[tuple[int, object]]) -> dict:
         "wrong_answers": ((label >= 0) & (label != truth)).mean(),
         "confidence": confidence.mean(),
         "calibration_error": calibration_error(right, confidence),
-        "borders": np.mean([d.border for _, d in pairs]),
         "cut_at_a_tenth_refused": refusal_cut(right, confidence),
     }
 
@@ -54,16 +52,9 @@ def refusal_cut(right: np.ndarray, confidence: np.ndarray) -> float:
 
 def strip_score(model, strip) -> dict:
     """One drive over many tiles. A tip that an edge holds meets the next tile when it is let go: until then it is at
-    the border, and 150 ms count from the first."""
+    the border."""
     found = decide(model, strip.counts)
-    met, left = strip.borders()
-    reported = model.judge(strip.counts, WINDOW, notices=True) if isinstance(model, SpectralModel) else found
-    flagged = np.array([d.end for d in reported if d.border], dtype=float)
-    within = BORDER_S / TICK_S + LOOK
-    seen = [bool(((flagged > m) & (flagged <= m + within)).any()) for m in met]
-    near = [*zip(met, left, strict=True), *strip.held()]
-    strange = [f for f in flagged if not any(first < f and f - WINDOW <= last + within for first, last in near)]
-    events = sum(1 for n, f in enumerate(strange) if n == 0 or f - strange[n - 1] > WINDOW)
+    left = strip.left()
     parts = {"inside": [], "late": 0, "held": 0, "held_wrong": 0}
     for d in found:
         first, last = max(0, d.end - WINDOW) // LOOK, min((d.end - 1) // LOOK, len(strip.surface) - 1)
@@ -77,19 +68,16 @@ def strip_score(model, strip) -> dict:
             parts["inside"].append((truth, d))
         since = d.end - left[left <= d.end]
         parts["late"] += bool(wrong and len(since) and WRONG_S / TICK_S + LOOK < since.min() <= 2 * WINDOW + LOOK)
-    return parts | {"seen": seen, "false": events, "metres": strip.metres}
+    return parts | {"borders": len(left), "metres": strip.metres}
 
 
 def strip_scores(parts: list[dict]) -> dict:
     """Of several drives together."""
-    seen = np.concatenate([p["seen"] for p in parts])
-    metres, held = sum(p["metres"] for p in parts), max(1, sum(p["held"] for p in parts))
+    crossed, held = sum(p["borders"] for p in parts), max(1, sum(p["held"] for p in parts))
     return summary([pair for p in parts for pair in p["inside"]]) | {
-        "borders_crossed": len(seen),
-        "reported_in_150_ms": seen.mean(),
-        "metres": metres,
-        "false_borders_per_10_m": 10 * sum(p["false"] for p in parts) / metres,
-        "wrong_later_than_100_ms_per_border": sum(p["late"] for p in parts) / len(seen),
+        "borders_crossed": crossed,
+        "metres": sum(p["metres"] for p in parts),
+        "wrong_later_than_100_ms_per_border": sum(p["late"] for p in parts) / crossed,
         "windows_held_by_an_edge": held,
         "wrong_while_held": sum(p["held_wrong"] for p in parts) / held,
     }

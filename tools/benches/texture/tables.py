@@ -69,8 +69,6 @@ def borders() -> str:
             "method": "{method}",
             "borders": "{borders_crossed}",
             "m": "{metres:.0f}",
-            "reported in 150 ms": "{reported_in_150_ms:100*.1f}",
-            "false per 10 m": "{false_borders_per_10_m:.2f}",
             "wrong after 100 ms, per border": "{wrong_later_than_100_ms_per_border:.3f}",
             "held: wrong": "{wrong_while_held:100*.1f}",
         },

@@ -54,20 +54,15 @@ class Strip:
     caught: np.ndarray
     metres: float
 
-    def borders(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where the tip met another tile, and where it was on it: later if the edge held it; in samples."""
+    def left(self) -> np.ndarray:
+        """Where the tip was on another tile, later than where it met it if the edge held it; in samples."""
         met = np.flatnonzero(np.diff(self.surface)) + 1
         left = []
         for at in met:
             held = next((k for k in range(at - 2, at + 3) if 0 <= k < len(self.caught) and self.caught[k]), None)
             free = np.flatnonzero(~self.caught[held:]) if held is not None else []
             left.append(held + free[0] if len(free) else at)
-        return met * LOOK, np.array(left, dtype=int) * LOOK
-
-    def held(self) -> list[tuple[int, int]]:
-        """When an edge held the tip, between tiles of one surface too: first and last, in samples."""
-        change = np.flatnonzero(np.diff(np.concatenate([[0], self.caught.astype(int), [0]]))) * LOOK
-        return list(zip(change[::2].tolist(), change[1::2].tolist(), strict=True))
+        return np.array(left, dtype=int) * LOOK
 
 
 def strips(seed: int, robot: int, speed_m_s: float) -> list[Strip]:
@@ -76,13 +71,6 @@ def strips(seed: int, robot: int, speed_m_s: float) -> list[Strip]:
     across, along = round(WIDTH_M / TILE_M), round((STRIP_M + 1.0) / TILE_M)
     rows = [[SURFACES[i] for i in rng.integers(3, size=along)] for _ in range(across)]
     return _drive_along(rows, seed, robot, speed_m_s, STRIP_M - 0.4)
-
-
-def strip_over(tiles: list[str], seed: int, robot: int, speed_m_s: float) -> list[Strip]:
-    """A straight drive over these tiles, both whiskers on the same ones."""
-    return _drive_along(
-        [[*tiles, tiles[-1]]] * round(WIDTH_M / TILE_M), seed, robot, speed_m_s, TILE_M * len(tiles) - 0.4
-    )
 
 
 def _drive_along(rows: list[list[str]], seed: int, robot: int, speed_m_s: float, metres: float) -> list[Strip]:

@@ -5,7 +5,7 @@
 #define CORRELATION_MOST 0.99 /* beyond it Fisher's z says more about quantisation than about the floor */
 #define TINY 1e-12            /* counts squared, far below any sensor's step: keeps a constant channel's logs finite */
 
-enum { BANDS_MAX = 40, BANDS_PER_OCTAVE = 3, TAPS = 9, KERNELS = 84, DILATIONS_MAX = 6 };
+enum { BANDS_MAX = 40, BANDS_PER_OCTAVE = 3, STRETCHES = 8, TAPS = 9, KERNELS = 84, DILATIONS_MAX = 6 };
 
 /* Log powers of stretches of one length. The transform is radix 2: `size` real numbers, the stretch and zeros, are
  * taken as size/2 complex ones (even samples real, odd imaginary), transformed in place, and unravelled. */
@@ -20,13 +20,14 @@ struct spectrum {
 };
 
 struct nav_texture_features {
-    int channels, length, levels, stretches, shapes;
+    int channels, length, shapes;
     const double *floor, *threshold; /* [channels]; [shapes], or NULL */
-    double *centred, *squares;       /* [channels][length] less the mean; [channels] sum of their squares */
-    double *part, *row;              /* [stretch.length or stretches] centred; [stretches][logs] */
+    double *straight;                /* [channels][length] about a line */
+    double *squares;                 /* [channels] their sum of squares */
+    double *part, *row;              /* [stretch.length] about a line; [STRETCHES][logs] */
     float *x, *third; /* [length] one channel; a third of the sum of all nine taps, at each place: single precision is
                          finer than any sensor */
-    struct spectrum whole, stretch;
+    struct spectrum whole, stretch; /* the latter's length is 0 where windows are too short */
 };
 
 /* Bins 1 to size/2, in bands whose edges are a third of an octave apart but never less than one bin. */
@@ -78,23 +79,22 @@ static void features_place(void *of, struct nav_texture_slab *m)
     size_t channels = (size_t)f->channels, length = (size_t)f->length;
     nav_texture_slab_copy(m, &f->floor, channels);
     nav_texture_slab_copy(m, &f->threshold, (size_t)f->shapes);
-    f->centred = nav_texture_slab_cut(m, channels * length);
+    f->straight = nav_texture_slab_cut(m, channels * length);
     f->squares = nav_texture_slab_cut(m, channels);
     f->x = (float *)nav_texture_slab_cut(m, length);
     f->third = (float *)nav_texture_slab_cut(m, length);
     features_place_spectrum(&f->whole, f->length, m);
-    if (f->stretches == 0)
+    int stretch = 2 * f->length / (STRETCHES + 1);
+    if (stretch < NAV_TEXTURE_LENGTH_MIN)
         return;
-    features_place_spectrum(&f->stretch, 2 * f->length / (f->stretches + 1), m);
-    f->part = nav_texture_slab_cut(m, (size_t)(f->stretch.length + f->stretches));
-    f->row = nav_texture_slab_cut(m, (size_t)f->stretches * (size_t)(f->stretch.bands + 2));
+    features_place_spectrum(&f->stretch, stretch, m);
+    f->part = nav_texture_slab_cut(m, (size_t)stretch);
+    f->row = nav_texture_slab_cut(m, STRETCHES * (size_t)(f->stretch.bands + 1));
 }
 
-static bool features_sizes_ok(int channels, int length, int shorter, const double *floor)
+static bool features_sizes_ok(int channels, int length, const double *floor)
 {
     if (channels < 1 || channels > NAV_TEXTURE_CHANNELS_MAX)
-        return false;
-    if (shorter != 0 && (shorter < 2 || shorter > length / NAV_TEXTURE_LENGTH_MIN))
         return false;
     for (int c = 0; c < channels; c++) {
         if (floor[c] < 0.0)
@@ -103,15 +103,13 @@ static bool features_sizes_ok(int channels, int length, int shorter, const doubl
     return length >= NAV_TEXTURE_LENGTH_MIN && length <= NAV_TEXTURE_LENGTH_MAX;
 }
 
-struct nav_texture_features *nav_texture_features_new(int channels, int length, int levels, int shorter,
-                                                      const double *floor, const double *shape)
+struct nav_texture_features *nav_texture_features_new(int channels, int length, const double *floor,
+                                                      const double *shape)
 {
-    if (!features_sizes_ok(channels, length, shorter, floor) || (shape && nav_texture_shape_count(length) == 0))
+    if (!features_sizes_ok(channels, length, floor) || (shape && nav_texture_shape_count(length) == 0))
         return NULL;
     struct nav_texture_features like = {.channels = channels,
                                         .length = length,
-                                        .levels = levels != 0,
-                                        .stretches = shorter ? 2 * shorter - 1 : 0,
                                         .shapes = shape ? nav_texture_shape_count(length) : 0,
                                         .floor = floor,
                                         .threshold = shape};
@@ -138,22 +136,22 @@ int nav_texture_shape_count(int length)
 
 int nav_texture_features_count(const struct nav_texture_features *f)
 {
-    int stretches = f->stretches ? 2 * (f->stretch.bands + 2) : 0;
-    return f->channels * (f->whole.bands + 2 + f->levels + stretches) + f->channels * (f->channels - 1) / 2 + f->shapes;
+    int stretches = f->stretch.length ? 2 * (f->stretch.bands + 1) : 0;
+    return f->channels * (f->whole.bands + 1 + stretches) + f->channels * (f->channels - 1) / 2 + f->shapes;
 }
 
-/* to[n] = every stride-th number of `from` less their mean, which is returned; *squares: the sum of their squares. */
-static double features_centre(const double *from, size_t stride, int n, double *to, double *squares)
+/* to[n] = every stride-th number of `from` less the straight line that fits them best. */
+static void features_straighten(const double *from, size_t stride, int n, double *restrict to)
 {
-    double sum = 0.0, left = 0.0;
-    for (int i = 0; i < n; i++)
-        sum += to[i] = from[(size_t)i * stride];
+    double sum = 0.0, moment = 0.0, middle = 0.5 * (n - 1);
     for (int i = 0; i < n; i++) {
-        to[i] -= sum / n;
-        left += to[i] * to[i];
+        to[i] = from[(size_t)i * stride];
+        sum += to[i];
+        moment += (i - middle) * to[i];
     }
-    *squares = left;
-    return sum / n;
+    double slope = moment * 12.0 / ((double)n * ((double)n * n - 1.0)), level = sum / n;
+    for (int i = 0; i < n; i++)
+        to[i] -= level + slope * (i - middle);
 }
 
 static void features_butterfly(double *restrict a, double *restrict b, const double *restrict turn)
@@ -213,9 +211,10 @@ static double features_power(const struct spectrum *b, int k)
     return re * re + im * im;
 }
 
-/* Log powers of a centred stretch: by bands, of the whole, of the steps. Returns the end of what it wrote. */
-static double *features_logs(const struct spectrum *b, const double *x, double squares, double floor, double *out)
+/* Log powers of a stretch about a line: by bands, and of the steps. */
+static void features_logs(const struct spectrum *b, const double *x, double floor, double *out)
 {
+    double steps = 0.0;
     features_transform(b, x);
     for (int band = 0; band < b->bands; band++) {
         double sum = 0.0;
@@ -223,39 +222,45 @@ static double *features_logs(const struct spectrum *b, const double *x, double s
             sum += features_power(b, k);
         *out++ = log(sum / (b->taper_power * (b->edge[band + 1] - b->edge[band])) + floor);
     }
-    double steps = 0.0;
     for (int i = 1; i < b->length; i++)
         steps += (x[i] - x[i - 1]) * (x[i] - x[i - 1]);
-    *out++ = log(squares / b->length + floor);
-    *out++ = log(steps / (b->length - 1) + floor);
-    return out;
+    *out = log(steps / (b->length - 1) + floor);
 }
 
 /* Statistics of a channel's stretches: the mean of each log, then its standard deviation. */
 static double *features_stretches(const struct nav_texture_features *f, const double *x, double floor, double *out)
 {
-    int count = f->stretch.bands + 2;
-    double *row = f->row, squares;
-    for (int i = 0; i < f->stretches; i++) {
-        long start = (long)(f->length - f->stretch.length) * i / (f->stretches - 1);
-        features_centre(x + start, 1, f->stretch.length, f->part, &squares);
-        row = features_logs(&f->stretch, f->part, squares, floor, row);
+    int count = f->stretch.bands + 1, length = f->stretch.length;
+    for (int i = 0; i < STRETCHES; i++) {
+        features_straighten(x + (f->length - length) * i / (STRETCHES - 1), 1, length, f->part);
+        features_logs(&f->stretch, f->part, floor, f->row + i * count);
     }
     for (int c = 0; c < count; c++) {
-        double mean = features_centre(f->row + c, (size_t)count, f->stretches, f->part, &squares);
+        double mean = 0.0, squares = 0.0;
+        for (int i = 0; i < STRETCHES; i++)
+            mean += f->row[i * count + c] / STRETCHES;
+        for (int i = 0; i < STRETCHES; i++)
+            squares += (f->row[i * count + c] - mean) * (f->row[i * count + c] - mean);
         out[c] = mean;
-        out[count + c] = sqrt(squares / f->stretches);
+        out[count + c] = sqrt(squares / STRETCHES);
     }
     return out + 2 * count;
 }
 
+static double features_product(const double *x, const double *y, int n)
+{
+    double sum = 0.0;
+    for (int i = 0; i < n; i++)
+        sum += x[i] * y[i];
+    return sum;
+}
+
+/* Fisher's z of the correlation of two channels. */
 static double features_correlation(const struct nav_texture_features *f, int a, int b)
 {
-    const double *x = f->centred + (size_t)a * (size_t)f->length, *y = f->centred + (size_t)b * (size_t)f->length;
-    double sum = 0.0, least = TINY * f->length;
-    for (int i = 0; i < f->length; i++)
-        sum += x[i] * y[i];
-    double r = sum / sqrt((f->squares[a] + least) * (f->squares[b] + least));
+    const double *x = f->straight + (size_t)a * (size_t)f->length, *y = f->straight + (size_t)b * (size_t)f->length;
+    double least = TINY * f->length, spread = (f->squares[a] + least) * (f->squares[b] + least);
+    double r = features_product(x, y, f->length) / sqrt(spread);
     return atanh(fmin(fmax(r, -CORRELATION_MOST), CORRELATION_MOST));
 }
 
@@ -296,7 +301,7 @@ static void features_shapes(const struct nav_texture_features *f, double *out)
     for (int d = 0; d < f->shapes / KERNELS; d++) {
         for (int c = 0; c < f->channels && c < KERNELS; c++) {
             for (int i = 0; i < f->length; i++)
-                f->x[i] = (float)f->centred[(size_t)c * (size_t)f->length + (size_t)i];
+                f->x[i] = (float)f->straight[(size_t)c * (size_t)f->length + (size_t)i];
             features_kernels(f, 1 << d, (c + d) % f->channels, f->threshold + d * KERNELS, out + d * KERNELS);
         }
     }
@@ -305,12 +310,12 @@ static void features_shapes(const struct nav_texture_features *f, double *out)
 void nav_texture_features_work(struct nav_texture_features *f, const double *window, double *out)
 {
     for (int c = 0; c < f->channels; c++) {
-        double *x = f->centred + (size_t)c * (size_t)f->length, floor = f->floor[c] + TINY;
-        double mean = features_centre(window + c, (size_t)f->channels, f->length, x, &f->squares[c]);
-        out = features_logs(&f->whole, x, f->squares[c], floor, out);
-        if (f->levels)
-            *out++ = mean;
-        if (f->stretches)
+        double *x = f->straight + (size_t)c * (size_t)f->length, floor = f->floor[c] + TINY;
+        features_straighten(window + c, (size_t)f->channels, f->length, x);
+        f->squares[c] = features_product(x, x, f->length);
+        features_logs(&f->whole, x, floor, out);
+        out += f->whole.bands + 1;
+        if (f->stretch.length)
             out = features_stretches(f, x, floor, out);
     }
     for (int a = 0; a < f->channels; a++) {

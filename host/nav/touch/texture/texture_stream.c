@@ -2,11 +2,8 @@
 
 #include "texture_slab.h"
 
-#define SINCE_LONG (1 << 30)
 #define SURE 0.9            /* probability of another class at which windows are no longer of the same row */
-#define CHANGED 0.9         /* share of reported change points that are true */
 #define MOVED 0.5           /* chance that an edge that holds the tip is the border of another surface */
-#define LOG_ODDS_MOST 20.0  /* of a surface never trained: a confidence of 0 means no evidence at all */
 #define TINY 1e-300         /* keeps a sum of probabilities above 0 where the likeliest class has none */
 #define BAD_SHARE_MOST 0.25 /* of a window; with more, its spectrum is that of the gaps */
 
@@ -15,14 +12,12 @@ struct nav_texture_stream {
     struct nav_texture_classifier *classifier[NAV_TEXTURE_CLASSIFIERS_MAX];
     double *raw;   /* [room][channels] samples since the last decision */
     double *clean; /* [room][channels] */
-    double *block; /* [a block of `change`][channels] samples since the last block */
     double *apart; /* [novelty's length][channels] samples since its last window; unused if aligned */
     double *posterior, *ahead, *part; /* [classes] at the last decision; with the samples since; of one window */
-    int room, held, blocked, apart_held;
-    int since;    /* samples since the surface changed, or SINCE_LONG */
-    bool border;  /* a change found since the last decision */
+    int room, held, apart_held;
+    bool begun;   /* there was evidence before the samples held */
     int kind;     /* class of the windows in a row that novelty is judged by, or NAV_TEXTURE_UNKNOWN */
-    double novel; /* probability that those are of a surface never trained */
+    double novel; /* how novel they are */
 };
 
 void nav_texture_filter_start(double *posterior, int classes)
@@ -55,7 +50,7 @@ void nav_texture_filter_run(const double *loglik, size_t rows, int classes, doub
         else
             memcpy(posterior, posterior - classes, (size_t)classes * sizeof *posterior);
         nav_texture_filter_change(posterior, classes, chance);
-        nav_texture_filter_weigh(posterior, classes, loglik, temper);
+        nav_texture_filter_weigh(posterior, classes, loglik, i == 0 ? 1.0 : temper);
     }
 }
 
@@ -74,7 +69,7 @@ static bool stream_numbers_ok(const struct nav_texture_rules *r)
 {
     bool sequential = r->patience >= r->step && r->patience <= NAV_TEXTURE_WINDOW_MAX;
     return r->window >= 2 && r->window <= NAV_TEXTURE_WINDOW_MAX && r->step >= 0 && (r->step == 0 || sequential) &&
-           r->hazard > 0.0 && r->temper >= 0.0 && isfinite(r->hazard) && isfinite(r->temper);
+           r->hazard > 0.0 && isfinite(r->hazard);
 }
 
 static bool stream_novelty_ok(const struct nav_texture_rules *r)
@@ -102,11 +97,6 @@ static bool stream_aligned(const struct nav_texture_stream *s)
     return s->rules.step == 0 && s->rules.window == stream_novelty_length(s);
 }
 
-static int stream_block_length(const struct nav_texture_stream *s)
-{
-    return s->rules.change ? nav_texture_change_length(s->rules.change) : 0;
-}
-
 static void stream_copy_limit(struct nav_texture_slab *m, const double **limit, int channels)
 {
     if (*limit)
@@ -123,7 +113,6 @@ static void stream_place(void *of, struct nav_texture_slab *m)
         stream_copy_limit(m, limits[i], s->rules.channels);
     s->raw = nav_texture_slab_cut(m, (size_t)s->room * channels);
     s->clean = nav_texture_slab_cut(m, (size_t)s->room * channels);
-    s->block = nav_texture_slab_cut(m, (size_t)stream_block_length(s) * channels);
     s->apart = nav_texture_slab_cut(m, (size_t)stream_novelty_length(s) * channels);
     s->posterior = nav_texture_slab_cut(m, classes);
     s->ahead = nav_texture_slab_cut(m, classes);
@@ -162,12 +151,9 @@ static void stream_new_row(struct nav_texture_stream *s)
 
 void nav_texture_stream_reset(struct nav_texture_stream *s)
 {
-    s->held = s->blocked = 0;
-    s->since = SINCE_LONG;
-    s->border = false;
+    s->held = 0;
+    s->begun = false;
     nav_texture_filter_start(s->posterior, s->rules.classes);
-    if (s->rules.change)
-        nav_texture_change_reset(s->rules.change);
     stream_new_row(s);
 }
 
@@ -185,11 +171,12 @@ static bool stream_clean(struct nav_texture_stream *s, struct nav_texture_decisi
     return !stream_unreadable(&d->health, s->held) && d->health.caught == 0;
 }
 
-/* What n samples say of each class, the best's 0: the longest classifier that fits covers them in evenly spaced
- * windows, and counts by how many of its windows they would fill. False when they are shorter than every classifier. */
-static bool stream_evidence(struct nav_texture_stream *s, const double *from, int n, double *loglik)
+/* What the samples held say of each class, the best's 0: the longest classifier that fits covers them in evenly spaced
+ * windows. Evidence is that of as many windows as they fill, of which the first counts whole if nothing was before it.
+ * False when they are shorter than every classifier. */
+static bool stream_evidence(struct nav_texture_stream *s, double *loglik, double *factor)
 {
-    int at = s->rules.classifiers - 1, classes = s->rules.classes;
+    int at = s->rules.classifiers - 1, classes = s->rules.classes, n = s->held;
     while (at >= 0 && nav_texture_classifier_length(s->classifier[at]) > n)
         at--;
     memset(loglik, 0, (size_t)classes * sizeof *loglik);
@@ -198,15 +185,17 @@ static bool stream_evidence(struct nav_texture_stream *s, const double *from, in
     int length = nav_texture_classifier_length(s->classifier[at]), windows = (n + length - 1) / length;
     for (int w = 0; w < windows; w++) {
         long start = windows > 1 ? (long)(n - length) * w / (windows - 1) : 0;
-        nav_texture_classifier_judge(s->classifier[at], from + start * s->rules.channels, s->part);
+        nav_texture_classifier_judge(s->classifier[at], s->clean + start * s->rules.channels, s->part);
         for (int k = 0; k < classes; k++)
             loglik[k] += s->part[k];
     }
-    double best = -INFINITY, share = (double)n / length / windows;
+    double best = -INFINITY, filled = (double)n / length;
+    double behind = nav_texture_classifier_behind(s->classifier[at]);
     for (int k = 0; k < classes; k++)
         best = fmax(best, loglik[k]);
     for (int k = 0; k < classes; k++)
-        loglik[k] = (loglik[k] - best) * share;
+        loglik[k] = (loglik[k] - best) * filled / windows;
+    *factor = s->begun ? behind : (1.0 + behind * (filled - 1.0)) / filled;
     return true;
 }
 
@@ -222,18 +211,18 @@ static int stream_likeliest(const double *posterior, int classes)
 static void stream_weigh_novelty(struct nav_texture_stream *s)
 {
     const double *features = nav_texture_classifier_features(s->classifier[s->rules.novelty_classifier]);
-    s->novel = 1.0 / (1.0 + exp(-fmin(nav_texture_novelty_weigh(s->rules.novelty, features), LOG_ODDS_MOST)));
+    s->novel = nav_texture_novelty_weigh(s->rules.novelty, features);
 }
 
 /* Whether the row of windows is of a surface never trained. Where the filter is sure of another class, a row begins. */
-static void stream_follow_row(struct nav_texture_stream *s, int best, int n)
+static void stream_follow_row(struct nav_texture_stream *s, int best)
 {
     if (s->ahead[best] > SURE && best != s->kind) {
         if (s->kind != NAV_TEXTURE_UNKNOWN)
             stream_new_row(s);
         s->kind = best;
     }
-    if (stream_aligned(s) && n == s->held)
+    if (stream_aligned(s))
         stream_weigh_novelty(s);
 }
 
@@ -255,63 +244,28 @@ static void stream_answer(const struct nav_texture_stream *s, struct nav_texture
 {
     double least = s->rules.step > 0 ? s->rules.sure : s->rules.doubt;
     d->novelty = s->novel;
-    d->confidence = (1.0 - s->novel) * s->ahead[d->best];
-    d->label = d->confidence >= least && s->novel < 0.5 ? d->best : NAV_TEXTURE_UNKNOWN;
+    d->confidence = s->ahead[d->best];
+    d->label = d->confidence >= least && s->novel <= 1.0 ? d->best : NAV_TEXTURE_UNKNOWN;
 }
 
 /* Decides on the samples held. Returns whether a sequential decision may stop here. */
 static bool stream_decide(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
 {
-    int classes = s->rules.classes, n = s->since < s->held ? s->since : s->held;
+    int classes = s->rules.classes;
+    double factor;
     *d = (struct nav_texture_decision){.samples = s->held};
     bool readable = stream_clean(s, d), caught = d->health.caught > 0 && d->health.railed == 0;
-    d->border = s->border || n < s->held;
     memcpy(s->ahead, s->posterior, (size_t)classes * sizeof *s->ahead);
-    nav_texture_filter_change(s->ahead, classes, caught ? MOVED : stream_chance(s, n));
-    if (!readable || !stream_evidence(s, s->clean + (size_t)(s->held - n) * (size_t)s->rules.channels, n, loglik)) {
+    nav_texture_filter_change(s->ahead, classes, caught ? MOVED : stream_chance(s, s->held));
+    if (!readable || !stream_evidence(s, loglik, &factor)) {
         stream_no_evidence(s, d, loglik);
         return false;
     }
-    nav_texture_filter_weigh(s->ahead, classes, loglik, s->rules.temper);
+    nav_texture_filter_weigh(s->ahead, classes, loglik, factor);
     d->best = stream_likeliest(s->ahead, classes);
-    stream_follow_row(s, d->best, n);
+    stream_follow_row(s, d->best);
     stream_answer(s, d);
-    for (int k = 0; k < classes; k++)
-        loglik[k] *= 1.0 - s->novel;
-    return s->rules.step == 0 || fmax(d->confidence, s->novel) >= s->rules.sure;
-}
-
-/* How many samples lie behind a change of surface that this sample shows; 0 without. Samples that are not readable
- * interrupt the row of blocks; an edge that holds the tip, or lets it fall, does not. */
-static int stream_behind_change(struct nav_texture_stream *s, const double *sample)
-{
-    int length = stream_block_length(s), channels = s->rules.channels, after;
-    memcpy(s->block + (size_t)s->blocked++ * (size_t)channels, sample, (size_t)channels * sizeof *sample);
-    if (s->blocked < length)
-        return 0;
-    s->blocked = 0;
-    struct nav_texture_health health = nav_texture_clean(s->block, length, &s->rules.limits);
-    if (stream_unreadable(&health, length))
-        nav_texture_change_reset(s->rules.change);
-    else if (health.caught > 0)
-        nav_texture_change_edge(s->rules.change);
-    else if (nav_texture_change_weigh(s->rules.change, s->block, &after) > nav_texture_change_limit(s->rules.change))
-        return after * length;
-    return 0;
-}
-
-/* Whether this sample shows that the surface has changed. */
-static bool stream_changed(struct nav_texture_stream *s, const double *sample)
-{
-    s->since += s->since < SINCE_LONG;
-    int after = s->rules.change ? stream_behind_change(s, sample) : 0;
-    if (after == 0)
-        return false;
-    s->since = after;
-    s->border = true;
-    nav_texture_filter_change(s->posterior, s->rules.classes, CHANGED);
-    stream_new_row(s);
-    return true;
+    return s->rules.step == 0 || d->confidence >= s->rules.sure;
 }
 
 /* Windows of novelty's own, where decisions are of others. */
@@ -329,14 +283,6 @@ static void stream_follow_novelty(struct nav_texture_stream *s, const double *sa
     stream_weigh_novelty(s);
 }
 
-/* Word of a border before the window is full. */
-static void stream_notice(struct nav_texture_stream *s, struct nav_texture_decision *d, double *loglik)
-{
-    *d = (struct nav_texture_decision){.samples = s->held, .border = 1, .notice = 1};
-    memcpy(s->ahead, s->posterior, (size_t)s->rules.classes * sizeof *s->ahead);
-    stream_no_evidence(s, d, loglik);
-}
-
 static bool stream_due(const struct nav_texture_stream *s)
 {
     return s->held == s->room || (s->rules.step > 0 && s->held % s->rules.step == 0);
@@ -350,17 +296,11 @@ static bool stream_take(struct nav_texture_stream *s, const double *sample, stru
     memcpy(s->raw + (size_t)s->held++ * channels, sample, channels * sizeof *sample);
     if (s->rules.novelty && !stream_aligned(s))
         stream_follow_novelty(s, sample);
-    bool news = stream_changed(s, sample);
-    if (!stream_due(s)) {
-        if (news)
-            stream_notice(s, d, loglik);
-        return news;
-    }
-    if (!stream_decide(s, d, loglik) && s->held < s->room)
+    if (!stream_due(s) || (!stream_decide(s, d, loglik) && s->held < s->room))
         return false;
     memcpy(s->posterior, s->ahead, (size_t)s->rules.classes * sizeof *s->posterior);
+    s->begun = s->begun || d->confidence > 0.0;
     s->held = 0;
-    s->border = false;
     return true;
 }
 

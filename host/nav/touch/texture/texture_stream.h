@@ -1,16 +1,16 @@
 /* Texture of one whisker, sample by sample: windows in a row, or as few samples as it takes to be sure.
  *
- * One posterior, of a forward filter over windows in a row, answers all: its states are the classes and a surface never
- * trained. Between windows the surface changes with some chance, to each other class alike; a window's evidence then
- * weighs the classes, tempered, for windows of one drive err alike. A change point (texture_change.h) or an edge that
- * holds the tip is a border; what lies before it is no evidence of the surface now.
+ * A forward filter over windows in a row gives the probability of each class. Between windows the surface changes with
+ * some chance, to each other class alike; a window's evidence then weighs the classes: the first window's whole, that
+ * of those behind it by the classifier's factor, for windows of one drive err alike. An edge that holds the tip is no
+ * evidence, and behind it the surface may be another. Whether the surface was ever trained is a distance of its own
+ * (texture_novelty.h), which decides the label and leaves the probabilities alone.
  */
 #ifndef NAV_TEXTURE_STREAM_H
 #define NAV_TEXTURE_STREAM_H
 
 #include <stddef.h>
 
-#include "texture_change.h"
 #include "texture_classifier.h"
 #include "texture_clean.h"
 #include "texture_novelty.h"
@@ -32,15 +32,13 @@ struct nav_texture_rules {
     struct nav_texture_classifier *const
         *classifier; /* [classifiers] lent for the stream's life; not for use by two threads at a time */
     double hazard;   /* changes of surface per sample, above 0 */
-    double temper;   /* >= 0: factor of the evidence of windows in a row, which err alike */
     double doubt;    /* probability of a class below which the answer is "unknown" */
     int step;        /* 0: windows in a row. Else sequential: looks every so many samples, ... */
     double sure;     /* ... answers at this probability, ... */
     int patience;    /* ... and after so many samples in any case */
     struct nav_texture_limits limits;    /* channels as above */
-    struct nav_texture_change *change;   /* lent to this stream alone; NULL: no borders but edges that hold the tip */
-    struct nav_texture_novelty *novelty; /* likewise, of the first features of novelty_classifier; NULL: every surface
-                                            is taken for a trained one */
+    struct nav_texture_novelty *novelty; /* lent to this stream alone, of the first features of novelty_classifier;
+                                            NULL: every surface is taken for a trained one */
     int novelty_classifier;
 };
 
@@ -48,11 +46,8 @@ struct nav_texture_decision {
     int label;         /* class, or NAV_TEXTURE_UNKNOWN */
     int best;          /* the likeliest class, whatever the label */
     int samples;       /* that the decision took */
-    int border;        /* the surface changed within the window or since the one before it; or the whisker was caught */
-    int notice;        /* no window, but word of a border at once: no label, no evidence. The window goes on, and at its
-                        * end is judged by what lies behind the border */
     double confidence; /* probability of the likeliest class, given all since the stream began; 0 without evidence */
-    double novelty;    /* probability of a surface never trained */
+    double novelty;    /* distance from all trained surfaces over its limit: above 1 the label is unknown */
     struct nav_texture_health health;
 };
 
@@ -62,7 +57,7 @@ void nav_texture_stream_free(struct nav_texture_stream *);
 
 /* Takes samples[n][channels] (raw counts; nan: missing) up to the first decision, and returns how many it took: fewer
  * than n, or *decided set, when there is one. loglik[classes]: what these samples alone say, as log-likelihoods whose
- * largest is 0; all 0 without evidence, weak where a surface never trained is likely. */
+ * largest is 0; all 0 without evidence. */
 long nav_texture_stream_push(struct nav_texture_stream *, const double *samples, long n, int *decided,
                              struct nav_texture_decision *decision, double *loglik);
 
@@ -70,7 +65,7 @@ long nav_texture_stream_push(struct nav_texture_stream *, const double *samples,
 void nav_texture_stream_reset(struct nav_texture_stream *);
 
 /* The filter by itself: the posteriors[rows][classes] after each of so many windows of loglik[rows][classes], each
- * after a change of surface with this chance, from all classes alike. */
+ * after a change of surface with this chance, from all classes alike; `temper`: factor of all but the first. */
 void nav_texture_filter_run(const double *loglik, size_t rows, int classes, double temper, double chance,
                             double *posterior);
 /* cffi: end */

@@ -81,6 +81,7 @@ def report(model: Any) -> list[str]:
         f"{100 * f['refused']:.1f} % unknown, calibration error {f['calibration_error']:.3f}",
         f"held out, as soon as sure: {100 * f['sequential_accuracy']:.1f} % right after "
         f"{f['sequential_samples'] * ms:.4g} ms on average, calibration error {f['sequential_calibration_error']:.3f}",
+        f"unknown by {f['recordings']} recordings: at most {100 * f['refused_level']:.0f} % of new windows of the surfaces",
     ]
     return lines + [f"not learned: {text}" for text in model.not_learned()]
 
@@ -112,8 +113,7 @@ def classify(arguments: argparse.Namespace) -> int:
         if arguments.json:
             print(json.dumps(plain(vars(decision))))
         else:
-            border = " (border)" if decision.border else ""
-            print(f"{decision.t_s:.3f} s  {decision.label}  {decision.confidence:.3f}{border}")
+            print(f"{decision.t_s:.3f} s  {decision.label}  {decision.confidence:.3f}")
     return 0
 
 

@@ -215,7 +215,7 @@ class Pilot:
             return _likelihoods(whisker, None)
         window = self._window(lane)
         loglik = whisker.look(window)
-        self._notice_catch(lane, window, loglik)
+        self._notice_catch(lane, window)
         return _likelihoods(whisker, loglik)
 
     def _window(self, lane: int) -> np.ndarray:
@@ -238,9 +238,10 @@ class Pilot:
         felt = self.feelers[lane].felt if lane in self.feelers else None
         return steady and self.contacts[lane].touching and (felt is None or min(felt.face, felt.slip) >= SURE)
 
-    def _notice_catch(self, lane: int, window: np.ndarray, loglik: np.ndarray | None) -> None:
-        """A catch leaves good samples without evidence, window after window."""
-        reported = loglik is not None or np.count_nonzero(np.isfinite(window).all(axis=1)) < WINDOW_LEAST_GOOD
+    def _notice_catch(self, lane: int, window: np.ndarray) -> None:
+        """A catch leaves good samples without evidence, window after window; a surface never trained does not."""
+        few = np.count_nonzero(np.isfinite(window).all(axis=1)) < WINDOW_LEAST_GOOD
+        reported = few or not self.surfaces[lane].silent
         self._silent[lane] = 0 if reported else self._silent[lane] + 1
         if self._silent[lane] >= CATCH_WINDOWS:
             self._silent[lane] = 0

@@ -51,6 +51,8 @@ class FloorWhisker:
         """Equation 1 for a window (n, 2) of good samples, by class."""
         return self.model.loglik(dithered(window, self._rng), rest=self.rest)
 
+    silent = False  # whether the last window had no evidence though its samples are good: this way never says so
+
     def look(self, window: np.ndarray) -> np.ndarray | None:
         """Log-likelihood by class of a window (n, 2), nan where a sample is bad; None: too few good ones."""
         good = window[np.isfinite(window).all(axis=1)]
@@ -61,29 +63,22 @@ class FloorWhisker:
 
 
 class SpectralFloorWhisker:
-    """One floor whisker, the spectral way: it needs no rest, knows its windows in a row and says what it doubts.
-
-    Counts what it saw: windows, borders between surfaces or catches at them, and windows it had no answer to.
-    """
+    """One floor whisker, the spectral way: it needs no rest, knows its windows in a row and says what it doubts."""
 
     def __init__(self, model: SpectralModel):
         self.model = model
-        self.windows = self.borders = self.unknown = 0
+        self.silent = False  # whether the last window had no evidence, as during a catch
         self._stream = model.stream(WINDOW_SAMPLES)
 
     def follow(self, samples: np.ndarray) -> None:
         """Spectra are of differences: a drifting rest is not in them."""
 
     def look(self, window: np.ndarray) -> np.ndarray | None:
-        """Log-likelihood by class of a window (200, 2), nan where a sample is bad; None: no evidence, as during a catch.
-
-        Across a border it is that of the later half; of a surface never trained it is weak for all.
-        """
-        *notices, found = self._stream.push(window)
-        self.windows += 1
-        self.borders += bool(found.border or notices)
-        self.unknown += found.label < 0
-        return found.loglik if found.confidence > 0.0 else None
+        """Log-likelihood by class of a window (200, 2), nan where a sample is bad; None: no evidence, as during a catch or of
+        a surface never trained."""
+        (found,) = self._stream.push(window)
+        self.silent = found.confidence == 0.0
+        return found.loglik if not self.silent and found.novelty <= 1.0 else None
 
     def pause(self) -> None:
         """The next window does not follow the last."""

@@ -52,6 +52,13 @@ def test_the_push_begins_at_the_onset_whatever_the_rest_does(fitted):
     assert found.unit == "mm" and found.depth[-1] == pytest.approx(DEPTH_MM, abs=1.0)
 
 
+def test_a_late_slip_is_no_onset(fitted):
+    contact = press(70.0, np.random.default_rng(6))
+    slipped = np.clip((contact.depth_mm - 45.0) / 6.0, 0.0, 1.0)[:, None]  # half of the bend goes within 0.6 s
+    late = Contact(contact.t_s, contact.samples * (1.0 - 0.5 * slipped), depth_mm=contact.depth_mm)
+    assert press_of(late, fitted.window).depth[-1] == pytest.approx(DEPTH_MM, abs=1.5)
+
+
 def test_radii_and_their_spread_are_right_at_places_never_calibrated(fitted):
     held = presses(3, radii=(55.0, 65.0, 75.0, 85.0, 95.0))
     off = errors(fitted, held)

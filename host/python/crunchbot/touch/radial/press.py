@@ -28,6 +28,7 @@ CENTRES = 8
 LEAST_PLACES, LEAST_CONTACTS = 4, 8
 LINE_LEAST = 8  # samples in a line
 ONSET_SHARE = 0.06  # of the shortest push in calibration: lines before and after the onset
+ONSET_CLEAR = 0.4  # of the largest change of slope; later, larger ones may be slips (docs/methods/radial.md)
 MEDIAN = 5  # samples: a running median takes out single bad records
 DEEPEST_SHARE = 0.98  # of the shortest push in calibration: the last depth
 RADIUS_SLACK = 0.15  # radii beyond the calibrated ones that are answered, as a share
@@ -109,7 +110,7 @@ def _line_end(t_s: np.ndarray, samples: np.ndarray) -> np.ndarray:
 
 
 def _onset(t_s: np.ndarray, samples: np.ndarray, width: int) -> int | None:
-    """Index at which the slope changes most, between lines over `width` samples before and after it."""
+    """Index of the first clear change of slope, between lines over `width` samples before and after it."""
     count = len(t_s) - width
     if count <= width:
         return None
@@ -119,7 +120,8 @@ def _onset(t_s: np.ndarray, samples: np.ndarray, width: int) -> int | None:
     sx, sxx, sy, sxy = (total[width:] - total[:-width] for total in sums)
     slopes = (width * sxy - sx * sy) / np.maximum(width * sxx - sx * sx, 1e-300)
     change = np.linalg.norm(slopes[width:] - slopes[:-width], axis=1)
-    return width + int(np.argmax(change))
+    first = int(np.argmax(change >= ONSET_CLEAR * change.max()))
+    return width + first + int(np.argmax(change[first : first + width]))
 
 
 def features_of(press: Press, depth: float) -> np.ndarray | None:

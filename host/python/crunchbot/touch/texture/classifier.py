@@ -7,7 +7,6 @@ import numpy as np
 
 from ...native import as_doubles, doubles, ffi, lib
 
-SEED = 2011  # of the random projections; any will do
 NONE = np.zeros(0)
 GOLDEN = (5**0.5 - 1) / 2  # multiples of it are spread evenly over 0 to 1, however many are taken
 SHAPE_WINDOWS, HALVINGS = 64, 24  # that thresholds are taken from; of the range in which they are looked for
@@ -18,22 +17,16 @@ class Classifier:
     """A classifier for windows of `length` samples; the arrays as in nav_texture_classifier_numbers."""
 
     length: int
-    levels: bool
-    shorter: int
-    hidden: int
     floor: np.ndarray  # (channels,)
     shape: np.ndarray  # (shape_count(length),) thresholds, or (0,): without
-    centre: np.ndarray  # (F,)
-    scale: np.ndarray  # (F,)
-    weight: np.ndarray  # (F + hidden, classes)
+    weight: np.ndarray  # (F, classes)
     bias: np.ndarray  # (classes,)
-    temper: float = 1.0
+    behind: float = 1.0  # factor of the evidence of windows behind the first of a row
     span: np.ndarray | None = None  # (channels,) counts: the farthest that a window of this length may reach
-    seed: int = SEED
     _made: object = field(default=None, repr=False, compare=False)
 
-    ARRAYS = ("floor", "shape", "centre", "scale", "weight", "bias")
-    NUMBERS = ("length", "levels", "shorter", "hidden", "temper", "seed")
+    ARRAYS = ("floor", "shape", "weight", "bias")
+    NUMBERS = ("length", "behind")
 
     @property
     def native(self) -> ffi.CData:
@@ -43,24 +36,13 @@ class Classifier:
         return self._made
 
     def _make(self):
-        features = feature_count(self.floor, self.length, self.levels, self.shorter, self.shape)
-        shapes = {"floor": self.floor.shape, "centre": (features,), "scale": (features,), "bias": self.bias.shape}
-        shapes |= {"weight": (features + self.hidden, len(self.bias)), "shape": self.shape.shape}
-        shapes = {name: shape for name, shape in shapes.items() if name != "shape" or len(self.shape)}
+        features = feature_count(self.floor, self.length, self.shape)
+        shapes = {"floor": self.floor.shape, "bias": self.bias.shape, "weight": (features, len(self.bias))}
+        shapes |= {"shape": self.shape.shape} if len(self.shape) else {}
         where, sizes = f"classifier {self.length}", {"classes": len(self.bias), "channels": len(self.floor)}
-        numbers = sizes | {name: getattr(self, name) for name in self.NUMBERS}
-        return made("classifier", numbers | pointers(self, where, shapes), where)
-
-    def expand(self, windows: np.ndarray) -> np.ndarray:
-        """Windows (m, length, channels) -> standardised features and projections (m, F + hidden)."""
-        shape, width = (self.length, len(self.floor)), len(self.centre) + self.hidden
-        windows = as_doubles(windows, "windows", (None, *shape))
-        out = np.empty((len(windows), width))
-        for window, row in zip(windows, out, strict=True):
-            lib.nav_texture_classifier_expand(
-                self.native, doubles(window, "window", shape), doubles(row, "features", (width,))
-            )
-        return out
+        return made(
+            "classifier", sizes | {n: getattr(self, n) for n in self.NUMBERS} | pointers(self, where, shapes), where
+        )
 
 
 def pointers(part: Any, where: str, shapes: dict[str, tuple]) -> dict:
@@ -77,31 +59,27 @@ def made(kind: str, numbers: dict, where: str) -> ffi.CData:
     return ffi.gc(found, getattr(lib, f"nav_texture_{kind}_free"))
 
 
-def _reducer(floor: np.ndarray, length: int, levels: bool, shorter: int, shape: np.ndarray):
+def _reducer(floor: np.ndarray, length: int, shape: np.ndarray):
     """The C features of a window; ValueError for a size out of range."""
     channels, floor = len(floor), as_doubles(floor, "floor", (len(floor),))
     if len(shape) not in (0, lib.nav_texture_shape_count(length)):
         raise ValueError(f"texture: {len(shape)} thresholds of shape for windows of {length} samples")
     thresholds = doubles(as_doubles(shape, "shape", shape.shape), "shape", shape.shape) if len(shape) else ffi.NULL
-    made = lib.nav_texture_features_new(
-        channels, length, int(levels), shorter, doubles(floor, "floor", floor.shape), thresholds
-    )
+    made = lib.nav_texture_features_new(channels, length, doubles(floor, "floor", floor.shape), thresholds)
     if made == ffi.NULL:
         raise ValueError(f"texture: {channels} channels in windows of {length} samples are out of range")
     return ffi.gc(made, lib.nav_texture_features_free)
 
 
-def feature_count(floor: np.ndarray, length: int, levels: bool, shorter: int = 0, shape: np.ndarray = NONE) -> int:
+def feature_count(floor: np.ndarray, length: int, shape: np.ndarray = NONE) -> int:
     """Numbers that a window is reduced to; ValueError for a size out of range."""
-    return lib.nav_texture_features_count(_reducer(floor, length, levels, shorter, shape))
+    return lib.nav_texture_features_count(_reducer(floor, length, shape))
 
 
-def plain_features(
-    windows: np.ndarray, levels: bool, floor: np.ndarray, shorter: int = 0, shape: np.ndarray = NONE
-) -> np.ndarray:
-    """Windows (m, length, channels) -> features (m, F), not standardised; as in nav_texture_features_new."""
+def plain_features(windows: np.ndarray, floor: np.ndarray, shape: np.ndarray = NONE) -> np.ndarray:
+    """Windows (m, length, channels) -> features (m, F); as in nav_texture_features_new."""
     windows = as_doubles(windows, "windows", (None, None, len(floor)))
-    made = _reducer(floor, windows.shape[1], levels, shorter, shape)
+    made = _reducer(floor, windows.shape[1], shape)
     out = np.empty((len(windows), lib.nav_texture_features_count(made)))
     for window, row in zip(windows, out, strict=True):
         lib.nav_texture_features_work(
@@ -120,7 +98,7 @@ def shape_thresholds(windows: np.ndarray, floor: np.ndarray) -> np.ndarray:
     high = -low
     for _ in range(HALVINGS if count else 0):
         middle = 0.5 * (low + high)
-        more = plain_features(some, False, floor, 0, middle)[:, -count:].mean(axis=0) > wanted
+        more = plain_features(some, floor, middle)[:, -count:].mean(axis=0) > wanted
         low, high = np.where(more, middle, low), np.where(more, high, middle)
     return high
 

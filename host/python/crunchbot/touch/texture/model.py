@@ -116,8 +116,12 @@ def load(path: str | Path) -> TextureModel | SpectralModel:
         content = read_json(path)
     except UnreadableError as error:
         raise no_model(path, error) from error
-    if isinstance(content, dict) and content.get("format") == SPECTRAL_FORMAT:
+    known = content.get("format") if isinstance(content, dict) else None
+    if known == SPECTRAL_FORMAT:
         return SpectralModel.from_json(path, content)
+    if isinstance(known, str) and known.startswith(FORMAT.rstrip("1")) and known != FORMAT:
+        text = f"format '{known}' is of another release, which reads no other; this one reads '{SPECTRAL_FORMAT}'"
+        raise no_model(path, ValueError(text))
     return TextureModel.from_json(path, content)
 
 
@@ -130,7 +134,6 @@ class Decision:
     label: str  # a class, or "unknown"
     best: str  # the likeliest class, whatever the label
     confidence: float  # its probability: by equation 1, tempered, of the window; by default given all windows so far
-    border: bool  # the surface changed within the window or since the one before it
 
 
 def posterior(loglik: np.ndarray, temper: float = TEMPER) -> np.ndarray:
@@ -165,7 +168,7 @@ def classify(
 def _reported(model: SpectralModel, t_s: np.ndarray, d) -> Decision:
     label = "unknown" if d.label < 0 else model.classes[d.label]
     by_class = dict(zip(model.classes, map(float, d.loglik), strict=True))
-    return Decision(float(t_s[d.end - 1]), by_class, label, model.classes[d.best], d.confidence, d.border)
+    return Decision(float(t_s[d.end - 1]), by_class, label, model.classes[d.best], d.confidence)
 
 
 def _sequential(model: TextureModel, t_s: np.ndarray, samples: np.ndarray, window: int) -> list[Decision]:
@@ -183,13 +186,11 @@ def _sequential(model: TextureModel, t_s: np.ndarray, samples: np.ndarray, windo
 def _decide(model: TextureModel, t_s: float, window: np.ndarray) -> Decision:
     loglik = model.loglik(window)
     if not np.isfinite(window).all(axis=1).any():
-        return Decision(t_s, dict.fromkeys(model.classes, 0.0), "unknown", model.classes[0], 0.0, False)
+        return Decision(t_s, dict.fromkeys(model.classes, 0.0), "unknown", model.classes[0], 0.0)
     chance = posterior(loglik)
     best = model.classes[int(chance.argmax())]
-    halves = [posterior(model.loglik(half)) for half in np.array_split(window, 2)]
-    border = halves[0].argmax() != halves[1].argmax() and min(h.max() for h in halves) > 0.9
     by_class = dict(zip(model.classes, map(float, loglik), strict=True))
-    return Decision(t_s, by_class, best, best, float(chance.max()), bool(border))
+    return Decision(t_s, by_class, best, best, float(chance.max()))
 
 
 def channel_names(path: str | Path) -> list[str]:

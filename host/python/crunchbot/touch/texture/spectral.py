@@ -1,4 +1,4 @@
-"""Floor texture, the default method: a ladder of spectral classifiers, from recordings to calibrated decisions."""
+"""Floor texture, the default method: spectral classifiers of a window, its half and its quarter, from recordings to calibrated decisions."""
 
 import json
 from dataclasses import dataclass, field
@@ -10,26 +10,20 @@ from ...fields import Fields
 from ...native import as_doubles, doubles, ffi, lib
 from ...outputs import put
 from ...tables import TableError
-from .change import Change
 from .classifier import Classifier
 from .novelty import Novelty
 
-FORMAT = "whisker texture model 9"
-PARTS = {"change": Change, "novelty": Novelty}  # of windows in a row
+FORMAT = "whisker texture model 10"
 SENSOR_STOPS = (0.0, 65535.0)  # of raw counts, 16 bits
-WITHOUT = {  # what a model without a part cannot do, and what it would take
-    "change": "borders block by block; longer recordings, two or more of each surface, show the rate of false ones",
-    "novelty": "surfaces never trained, by windows in a row; give three recordings or more of each surface",
-}
+NO_NOVELTY = "surfaces never trained, by windows in a row; give two recordings or more of each surface, a window long"
 LIMITS = ("spike", "still", "low", "high")
 SURE = 0.95  # probability at which a sequential decision stops
 LOOKS = 4  # of a sequential decision in a window
 HAZARD_LEAST, HAZARD = 1e-6, 0.02  # changes of surface per window: tiles of 0.5 m at 0.1 m/s, windows of 100 ms
-LENGTH_MOST = 1 << 20  # samples of a window; also numbers of a projection
+LENGTH_MOST = 1 << 20  # samples of a window
 RANGES = {
     "rate_hz": (1e-3, 1e9),
     "window_ms": (1e-3, 1e6),
-    "temper": (0.0, 1.0),
     "doubt": (0.0, 1.0),
     "hazard": (HAZARD_LEAST, 1.0),
 }
@@ -44,11 +38,9 @@ class Judgement:
     label: int  # class, or -1
     best: int  # the likeliest class, whatever the label
     confidence: float  # its probability, given all samples since the stream began
-    border: bool
-    novelty: float  # probability of a surface never trained
+    novelty: float  # distance from all trained surfaces over its limit: above 1 the label is -1
     bad: int
     loglik: np.ndarray  # (classes,) of these samples alone
-    notice: bool = False  # no window, but word of a border at once
 
 
 @dataclass
@@ -60,10 +52,8 @@ class SpectralModel:
     classifiers: list[Classifier]
     limits: dict[str, np.ndarray]  # spike, still, low, high: (channels,)
     window_ms: float = 100.0
-    temper: float = 1.0  # of the evidence of windows in a row
     doubt: float = 0.0  # probability of a class below which the answer is "unknown"
     hazard: float = HAZARD  # changes of surface in window_ms
-    change: Change | None = None
     novelty: Novelty | None = None
     columns: list[str] = field(default_factory=list)  # names of the channels; empty: not known
     figures: dict = field(default_factory=dict)  # of held-out recordings, for the reader
@@ -74,28 +64,22 @@ class SpectralModel:
 
     def not_learned(self) -> list[str]:
         """What there was too little data to learn, a line each."""
-        return [text for name, text in WITHOUT.items() if getattr(self, name) is None]
+        return [NO_NOVELTY] if self.novelty is None else []
 
     def stream(self, window: int, step: int = 0, patience: int = 0) -> "Stream":
         """Decisions in windows of so many samples, or, with a step, sequential ones within `patience` samples."""
         return Stream(self, window, step, patience)
 
-    def judge(
-        self, samples: np.ndarray, window: int, sequential: bool = False, notices: bool = False
-    ) -> list[Judgement]:
-        """All decisions on samples (n, channels), with notices of borders between them only if asked for. Sequential: looks
-        four times a window, for up to four windows."""
+    def judge(self, samples: np.ndarray, window: int, sequential: bool = False) -> list[Judgement]:
+        """All decisions on samples (n, channels). Sequential: looks four times a window, for up to four windows."""
         step = min(max(self.classifiers[0].length, window // LOOKS), window) if sequential else 0
-        found = self.stream(window, step, 4 * window if sequential else 0).push(samples)
-        return [d for d in found if notices or not d.notice]
+        return self.stream(window, step, 4 * window if sequential else 0).push(samples)
 
     def save(self, path: str | Path) -> None:
         content = {"format": FORMAT, "classes": self.classes, "rate_hz": self.rate_hz, "window_ms": self.window_ms}
-        content |= {name: getattr(self, name) for name in ("temper", "doubt", "hazard", "columns", "figures")}
+        content |= {name: getattr(self, name) for name in ("doubt", "hazard", "columns", "figures")}
         content["limits"] = {name: _listed(self.limits[name]) for name in LIMITS}
-        for name in PARTS:
-            part = getattr(self, name)
-            content[name] = None if part is None else _fields(part)
+        content["novelty"] = None if self.novelty is None else _fields(self.novelty)
         content["classifiers"] = [_fields(r) | {"span": _listed(r.span)} for r in self.classifiers]
         put(path, json.dumps(content) + "\n")
 
@@ -123,7 +107,7 @@ class SpectralModel:
         classifiers = [_classifier(part) for part in fields.parts("classifiers", lib.NAV_TEXTURE_CLASSIFIERS_MAX)]
         limits = {name: fields.part("limits").array(name, 1) for name in LIMITS}
         numbers = {name: fields.number(name, *RANGES[name]) for name in RANGES}
-        parts = {name: _part(kind, fields.part(name)) for name, kind in PARTS.items() if fields.has(name)}
+        novelty = _novelty(fields.part("novelty")) if fields.has("novelty") else None
         fields.part("figures")
         columns = fields.names("columns", lib.NAV_TEXTURE_CHANNELS_MAX) if fields.take("columns") else []
         model = cls(
@@ -132,8 +116,8 @@ class SpectralModel:
             limits=limits,
             figures=fields.take("figures"),
             columns=columns,
+            novelty=novelty,
             **numbers,
-            **parts,
         )
         model.check()
         model.stream(2)
@@ -145,18 +129,14 @@ def no_model(path: str | Path, error: Exception) -> TableError:
 
 
 def _classifier(fields: Fields) -> Classifier:
-    flat = {name: fields.array(name, 1) for name in ("floor", "shape", "centre", "scale", "bias", "span")}
-    weight = fields.array("weight", 2)
-    whole = {name: fields.whole(name, 0, LENGTH_MOST) for name in ("length", "shorter", "hidden")}
-    seed, temper = fields.whole("seed", 0, 2**63), fields.number("temper", 0.0)
-    return Classifier(levels=fields.flag("levels"), seed=seed, temper=temper, weight=weight, **whole, **flat)
+    flat = {name: fields.array(name, 1) for name in ("floor", "shape", "bias", "span")}
+    length, behind = fields.whole("length", 1, LENGTH_MOST), fields.number("behind", 0.0, 1.0)
+    return Classifier(length=length, behind=behind, weight=fields.array("weight", 2), **flat)
 
 
-def _part(kind, fields: Fields):
-    """A Change or Novelty."""
-    arrays = {name: fields.array(name, dimensions) for name, dimensions in kind.ARRAYS.items()}
-    numbers = {name: fields.number(name, 0.0) for name in kind.NUMBERS if name != "length"}
-    return kind(length=fields.whole("length", 1, LENGTH_MOST), **numbers, **arrays)
+def _novelty(fields: Fields) -> Novelty:
+    arrays = {name: fields.array(name, dimensions) for name, dimensions in Novelty.ARRAYS.items()}
+    return Novelty(length=fields.whole("length", 1, LENGTH_MOST), **arrays)
 
 
 class Stream:
@@ -164,9 +144,7 @@ class Stream:
 
     def __init__(self, model: SpectralModel, window: int, step: int, patience: int):
         self._classes, self._channels, self._taken = len(model.classes), model.channels, 0
-        self._parts = {
-            name: _native(getattr(model, name)) for name in PARTS
-        }  # lent to the stream, as are the classifiers
+        self._novelty = ffi.NULL if model.novelty is None else model.novelty.native()  # lent, as are the classifiers
         self._classifiers = model.classifiers
         natives = ffi.new("struct nav_texture_classifier *[]", [c.native for c in model.classifiers])
         rules = {
@@ -175,8 +153,9 @@ class Stream:
             "classifiers": len(natives),
             "classifier": natives,
         }
-        rules |= {"window": window, "step": step, "patience": patience, "sure": SURE} | self._parts
-        rules |= {name: getattr(model, name) for name in ("temper", "doubt")}
+        rules |= {"window": window, "step": step, "patience": patience, "sure": SURE}
+        rules["novelty"] = self._novelty
+        rules["doubt"] = model.doubt
         rules["hazard"] = 1000.0 * model.hazard / (model.window_ms * model.rate_hz)
         if model.novelty is not None:
             rules["novelty_classifier"] = [c.length for c in model.classifiers].index(model.novelty.length)
@@ -217,14 +196,13 @@ class Stream:
 
     def _judgement(self, end: int) -> Judgement:
         d = self._decision
-        reported = d.confidence, bool(d.border), d.novelty, d.health.bad
-        return Judgement(end, d.samples, d.label, d.best, *reported, self._loglik.copy(), bool(d.notice))
+        return Judgement(end, d.samples, d.label, d.best, d.confidence, d.novelty, d.health.bad, self._loglik.copy())
 
 
 def forward(loglik: np.ndarray, temper: float, chance: float) -> np.ndarray:
     """The posterior after each of some windows in a row: log-likelihoods (m, classes) -> (m, classes).
 
-    Before each the surface changes with this chance; evidence counts `temper` times."""
+    Before each the surface changes with this chance; evidence of all but the first counts `temper` times."""
     loglik = as_doubles(loglik, "loglik", (None, None))
     posterior = np.empty_like(loglik)
     given = doubles(loglik, "loglik", loglik.shape), *loglik.shape
@@ -232,15 +210,11 @@ def forward(loglik: np.ndarray, temper: float, chance: float) -> np.ndarray:
     return posterior
 
 
-def _native(part: Change | Novelty | None):
-    return ffi.NULL if part is None else part.native()
-
-
-def _fields(part: Classifier | Change | Novelty) -> dict:
+def _fields(part: Classifier | Novelty) -> dict:
     return {n: getattr(part, n) for n in part.NUMBERS} | {n: _listed(getattr(part, n)) for n in part.ARRAYS}
 
 
 def _listed(array: np.ndarray) -> list:
-    """Numbers with six significant digits: enough for any decision, and short."""
-    flat = [float(f"{v:.6g}") for v in np.ravel(array)]
+    """Numbers with eight significant digits: enough for any decision, and short."""
+    flat = [float(f"{v:.8g}") for v in np.ravel(array)]
     return np.reshape(flat, np.shape(array)).tolist()

@@ -1,29 +1,34 @@
-"""Trains the default texture method from recordings; everything that is chosen is chosen on recordings held out."""
+"""Trains the default texture method from recordings; everything that is chosen is chosen on recordings held out.
+
+Of each fold of recordings there is a twin of the model that has not seen it: its rule, temperature, weight of later windows, doubt
+and limits are all of the other recordings. What is reported of the model are the twins' decisions on what they have not seen, made
+as any decision is. Only which features and which shrinkage are used, and the sensor's step, is settled once on all recordings.
+"""
 
 from collections.abc import Callable
-from itertools import zip_longest
+from dataclasses import replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from .change import fit_change
-from .fit import Fitted, Windows, fit
+from .classifier import blocks_of, plain_features
+from .fit import Windows, fit, most_probable
 from .model import longest_run
-from .novelty import fit_novelty
-from .spectral import HAZARD, SENSOR_STOPS, SpectralModel, forward
+from .novelty import Rows, conformal, fit_novelty, least_level, limits
+from .spectral import HAZARD, SENSOR_STOPS, Judgement, SpectralModel, forward
 
-FOLDS = 5
-SHORTER, LONGER = 8, 8  # classifiers from an eighth of the window to eight windows, in octaves
+FOLDS = 10  # or as many as there are recordings
+PIECES = 5  # that the one recording of a surface is cut into
+PARTS = (4, 2, 1)  # of a window, that there are classifiers of: for answers as soon as sure, and shorter windows
 LENGTH_LEAST, LENGTH_MOST = 4, 1024  # samples of a classifier
 WINDOWS_MOST = 6000  # of one classifier, over all recordings
-BLOCKS = 4  # of a window, in each of which a change of surface is looked for
 SPIKE_OVER = 3.0  # times what one sample in a thousand stands out from both neighbours
 STILL_OVER, STILL_LEAST = 2.0, 16  # times the longest run of equal samples; shorter runs happen to any sensor
 NO_STOP = 1e12  # of channels that are no raw counts
 SPAN_OVER = 1.5  # times the farthest that a training window reaches
-TEMPERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.08)  # of windows in a row
+BEHIND, BEHIND_SPREAD = 0.25, 1.0  # weight of windows behind the first before anything is seen, and its log's spread
 DOUBT = 0.9  # a class less probable is not named, ...
-REFUSE_MOST = 0.03  # ... as far as that costs no more than this share of held-out windows
+REFUSE_DOUBT, REFUSE_NOVEL = 0.03, 0.07  # ... as far as that costs no more; "unknown" may cost a tenth in all
 
 
 def train(
@@ -38,32 +43,157 @@ def train(
 
     ValueError when there is too little to learn from.
     """
-    parts = [_clean(np.asarray(r, dtype=np.float64)) for group in recordings.values() for r in group]
-    labels = [k for k, group in enumerate(recordings.values()) for _ in group]
-    parts, labels, folds = _fold(parts, labels)
-    base = max(LENGTH_LEAST, round(rate_hz * window_ms / 1000.0))
-    lengths = _ladder(base, min(map(len, parts)))
-    base = min(base, *(max(len(p) for p, k in zip(parts, labels, strict=True) if k == c) for c in set(labels)))
-    limits, floor = _limits(parts), _floor(parts)
-    fitted = []
-    for length in lengths:
-        fitted.append(fit(_windows(parts, labels, folds, length, len(recordings)), floor))
-        progress(len(fitted), len(lengths) + 1)
-    _give_spans(fitted, parts)
-    model = SpectralModel(list(recordings), rate_hz, [f.classifier for f in fitted], limits, window_ms, hazard=hazard)
-    _calibrate(model, fitted, parts, labels, folds, base)
-    block = max(LENGTH_LEAST, round(base / BLOCKS))
-    model.change = fit_change(parts, labels, folds, block, floor)
-    model.novelty = _novelty(model, parts, labels, folds, base)
-    progress(len(lengths) + 1, len(lengths) + 1)
+    learnt = Learnt(recordings, rate_hz, window_ms, hazard, progress)
+    model = learnt.model()
+    model.figures = learnt.figures()
+    progress(1, 1)
     return model
 
 
-def _give_spans(fitted: list[Fitted], parts: list) -> None:
-    for found in fitted:
-        span = SPAN_OVER * _widest(parts, found.classifier.length)
-        for classifier in (found.classifier, *found.twins):
-            classifier.span = span
+class Learnt:
+    """What is learnt from recordings, and the models that have not seen some of them."""
+
+    def __init__(self, recordings: dict, rate_hz: float, window_ms: float, hazard: float, progress: Callable):
+        self.classes, self.rate_hz, self.window_ms, self.hazard = list(recordings), rate_hz, window_ms, hazard
+        parts = [_clean(np.asarray(r, dtype=np.float64)) for group in recordings.values() for r in group]
+        self.parts, self.labels = _cut(parts, [k for k, group in enumerate(recordings.values()) for _ in group])
+        self.folds = np.arange(len(self.parts)) % min(FOLDS, len(self.parts))
+        asked, shortest = max(LENGTH_LEAST, round(rate_hz * window_ms / 1000.0)), min(map(len, self.parts))
+        if shortest < LENGTH_LEAST:
+            raise ValueError(f"the shortest recording has {shortest} samples; record each surface for some seconds")
+        longest = [
+            max(len(p) for p, k in zip(self.parts, self.labels, strict=True) if k == c) for c in set(self.labels)
+        ]
+        self.window, self.length = min(asked, *longest), min(asked, LENGTH_MOST, shortest)
+        lengths = sorted({max(LENGTH_LEAST, self.length // part) for part in PARTS})
+        floor = _floor(self.parts)
+        self._fitted = []
+        for length in lengths:
+            self._fitted.append(fit(self._windows(length), floor))
+            progress(len(self._fitted), len(lengths) + 1)
+        self._limits = [_limits(part) for part in self.parts]
+        self._spans = {length: [_widest(part, length) for part in self.parts] for length in lengths}
+        self._learn_distances(floor)
+        twins = {f: self._plain(f) for f in set(self.folds)}
+        self._rows = {}  # by length of a window: of each recording, by the twin that has not seen it
+        for length in {*lengths, self.window}:
+            of = zip(self.parts, self.folds, strict=True)
+            self._rows[length] = [self._said(twins[f].judge(part, length)) for part, f in of]
+
+    def _windows(self, length: int) -> Windows:
+        """Half overlapping windows of all recordings, thinned evenly to at most WINDOWS_MOST."""
+        starts = [np.arange(0, len(part) - length + 1, max(1, length // 2)) for part in self.parts]
+        keep = min(1.0, WINDOWS_MOST / sum(map(len, starts)))
+        chosen = [s[np.linspace(0, len(s) - 1, max(1, round(keep * len(s)))).astype(int)] for s in starts]
+        windows = np.stack([part[i : i + length] for part, some in zip(self.parts, chosen, strict=True) for i in some])
+        of = np.repeat(np.arange(len(chosen)), list(map(len, chosen)))
+        return Windows(windows, self.labels[of], self.folds[of], of, len(self.classes))
+
+    def _learn_distances(self, floor: np.ndarray) -> None:
+        """The distances from trained surfaces of all recordings and without each fold, and what they say of recordings left out."""
+        rows = [Rows(plain_features(blocks_of(p, self.length, len(floor)), floor)) for p in self.parts]
+        self._novelty = {}
+        for left_out in (None, *set(self.folds)):
+            kept = self._kept(left_out)
+            given = [rows[n] for n in kept], self.labels[kept]
+            self._novelty[left_out] = fit_novelty(*given, len(self.classes), self.length)
+        known = all(found is not None for found in self._novelty.values())
+        twins = [self._novelty[f] for f in self.folds]
+        self._distances = (
+            [[twin.distances(row) for row in r.each] for twin, r in zip(twins, rows, strict=True)] if known else None
+        )
+
+    def _kept(self, left_out: int | None) -> np.ndarray:
+        return np.flatnonzero(self.folds != left_out) if left_out is not None else np.arange(len(self.folds))
+
+    def _plain(self, left_out: int | None) -> SpectralModel:
+        """The model without a fold, which doubts nothing and takes each window by itself."""
+        kept = self._kept(left_out)
+        of = {
+            n: (np.min if n == "low" else np.max)([self._limits[i][n] for i in kept], axis=0) for n in self._limits[0]
+        }
+        spans = [SPAN_OVER * np.max([self._spans[s][i] for i in kept], axis=0) for s in self._spans]
+        classifiers = [f.classifier(span, left_out) for f, span in zip(self._fitted, spans, strict=True)]
+        return SpectralModel(self.classes, self.rate_hz, classifiers, of, self.window_ms, hazard=self.hazard)
+
+    def _said(self, found: list[Judgement]) -> np.ndarray:
+        """Log-likelihoods (m, classes) of the windows with any evidence."""
+        return np.array([d.loglik for d in found if d.confidence > 0.0]).reshape(-1, len(self.classes))
+
+    def model(self, left_out: int | None = None) -> SpectralModel:
+        """Of all recordings, or of all but those of a fold."""
+        made, kept = self._plain(left_out), self._kept(left_out)
+        for classifier in made.classifiers:
+            rows, chance = self._rows_of(classifier.length, kept)
+            classifier.behind = self._behind(rows, chance)
+        rows, chance = self._rows_of(self.window, kept)
+        behind = made.classifiers[-1].behind
+        sure = [-forward(loglik, behind, chance).max(axis=1) for loglik, _ in rows]
+        made.doubt = min(DOUBT, -conformal(sure, REFUSE_DOUBT)) if sure else 0.0
+        if self._distances is not None:
+            limit = limits([self._distances[n] for n in kept], REFUSE_NOVEL)
+            made.novelty = replace(self._novelty[left_out], limit=limit)
+        return made
+
+    def _rows_of(self, length: int, kept: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float]:
+        """Log-likelihoods of windows in a row with their class, of the recordings kept, and the chance of a change between two."""
+        rows = [(self._rows[length][n], self.labels[n]) for n in kept if len(self._rows[length][n])]
+        return rows, -float(np.expm1(-1000.0 * self.hazard * length / (self.window_ms * self.rate_hz)))
+
+    @staticmethod
+    def _behind(rows: list[tuple[np.ndarray, int]], chance: float) -> float:
+        return min(1.0, most_probable(lambda weight: _loss_behind(rows, weight, chance), BEHIND, BEHIND_SPREAD))
+
+    def held_out(self, sequential: bool = False) -> list[tuple[int, Judgement]]:
+        """Each decision on each recording by the model that has not seen it, with the recording's class."""
+        twins = {f: self.model(f) for f in sorted(set(self.folds))}
+        each = zip(self.parts, self.labels, self.folds, strict=True)
+        return [(k, d) for part, k, f in each for d in twins[f].judge(part, self.window, sequential)]
+
+    def figures(self) -> dict:
+        """What the model will do, for the reader."""
+        found, soon = self.held_out(), self.held_out(sequential=True)
+        level = max(REFUSE_DOUBT, least_level(len(self.parts)))
+        level += max(REFUSE_NOVEL, least_level(len(self.parts))) if self._distances is not None else 0.0
+        answered = [d.best == k for k, d in found if d.label >= 0]
+        return {
+            "recordings": len(self.parts),
+            "window_samples": self.window,
+            "held_out_accuracy": _mean([d.best == k for k, d in found]),
+            "refused": _mean([d.label < 0 for _, d in found]),
+            "refused_level": round(level, 4),
+            "accuracy_of_answers": _mean(answered),
+            "calibration_error": _calibration(found),
+            "sequential_accuracy": _mean([d.best == k for k, d in soon]),
+            "sequential_calibration_error": _calibration(soon),
+            "sequential_samples": round(float(np.mean([d.samples for _, d in soon])), 1) if soon else 0.0,
+        }
+
+
+def _mean(values: list) -> float:
+    return round(float(np.mean(values)), 4) if values else 0.0
+
+
+def _calibration(found: list[tuple[int, Judgement]]) -> float:
+    right, confidence = np.array([(d.best == k, d.confidence) for k, d in found], dtype=float).reshape(-1, 2).T
+    return round(calibration_error(right, confidence), 4)
+
+
+def calibration_error(right: np.ndarray, confidence: np.ndarray, bins: int = 10) -> float:
+    """Expected calibration error of decisions (m,) over equal bins of confidence."""
+    place = np.minimum((confidence * bins).astype(int), bins - 1)
+    each = [(place == b).mean() * abs(right[place == b].mean() - confidence[place == b].mean()) for b in set(place)]
+    return float(np.sum(each))
+
+
+def _loss_behind(rows: list[tuple[np.ndarray, int]], weight: float, chance: float) -> float:
+    """Of recordings of two windows or more, each counted once: what the filter's answers behind the first window cost, nats."""
+    loss = 0.0
+    for loglik, label in rows:
+        if len(loglik) > 1:
+            posterior = forward(loglik, min(1.0, weight), chance)[1:, label]
+            loss -= float(np.log(posterior).mean())
+    return loss
 
 
 def _clean(recording: np.ndarray) -> np.ndarray:
@@ -72,40 +202,15 @@ def _clean(recording: np.ndarray) -> np.ndarray:
     return recording[np.isfinite(recording).all(axis=1)]
 
 
-def _fold(parts: list, labels: list) -> tuple[list, np.ndarray, np.ndarray]:
-    """Spread each class's recordings over the folds; a class with one recording is cut into stretches of time."""
-    out, classes, folds = [], [], []
+def _cut(parts: list, labels: list) -> tuple[list, np.ndarray]:
+    """Recordings class by class; the one of a surface is cut into stretches of time."""
+    out, classes = [], []
     for k in sorted(set(labels)):
         mine = [part for part, label in zip(parts, labels, strict=True) if label == k]
-        if len(mine) == 1:
-            mine = np.array_split(mine[0], FOLDS)
-        for n, part in enumerate(sorted(mine, key=len, reverse=True)):
-            out.append(part)
-            classes.append(k)
-            folds.append(n % FOLDS)
-    return out, np.array(classes), np.array(folds)
-
-
-def _ladder(base: int, shortest: int) -> list[int]:
-    """Window lengths: the base and octaves around it, no longer than the shortest recording."""
-    tries = [base * 2.0**octave for octave in range(-int(np.log2(SHORTER)), int(np.log2(LONGER)) + 1)]
-    top = min(LENGTH_MOST, shortest)
-    while base <= LENGTH_LEAST * SHORTER and tries[-1] * 2 <= min(top, LENGTH_MOST // 2):
-        tries.append(tries[-1] * 2)  # a slow sensor: its windows of use are many times 100 ms
-    lengths = sorted({round(t) for t in tries if LENGTH_LEAST <= round(t) <= top})
-    if not lengths:
-        raise ValueError(f"the shortest recording has {shortest} samples; record each surface for some seconds")
-    return lengths
-
-
-def _windows(parts: list, labels: np.ndarray, folds: np.ndarray, length: int, classes: int) -> Windows:
-    """Half overlapping windows of all recordings, thinned evenly to at most WINDOWS_MOST."""
-    starts = [np.arange(0, len(part) - length + 1, max(1, length // 2)) for part in parts]
-    keep = min(1.0, WINDOWS_MOST / sum(map(len, starts)))
-    chosen = [s[np.linspace(0, len(s) - 1, max(1, round(keep * len(s)))).astype(int)] for s in starts]
-    windows = np.stack([part[i : i + length] for part, some in zip(parts, chosen, strict=True) for i in some])
-    counts = list(map(len, chosen))
-    return Windows(windows, np.repeat(labels, counts), np.repeat(folds, counts), classes, int(folds.max()) + 1)
+        mine = np.array_split(mine[0], PIECES) if len(mine) == 1 else mine
+        out += mine
+        classes += [k] * len(mine)
+    return out, np.array(classes)
 
 
 def _floor(parts: list) -> np.ndarray:
@@ -118,16 +223,14 @@ def _step(values: np.ndarray) -> float:
     return float(np.median(steps)) if len(steps) else 0.0
 
 
-def _limits(parts: list) -> dict[str, np.ndarray]:
+def _limits(part: np.ndarray) -> dict[str, np.ndarray]:
+    """What a recording shows of each channel, as limits that it keeps to."""
     found = {"spike": [], "still": [], "low": [], "high": []}
-    for c in range(parts[0].shape[1]):
-        channel = [p[:, c] for p in parts]
-        everything = np.concatenate(channel)
-        outstanding = np.concatenate([_outstanding(x) for x in channel])
-        found["spike"].append(SPIKE_OVER * np.quantile(outstanding, 0.999) + 4 * _step(everything))
-        found["still"].append(max(STILL_LEAST, STILL_OVER * max(map(longest_run, channel))))
-        counts = np.array_equal(everything, np.round(everything)) and everything.min() > SENSOR_STOPS[0]
-        counts = counts and everything.max() < SENSOR_STOPS[1]
+    for x in part.T:
+        outstanding = np.quantile(_outstanding(x), 0.999) if len(x) > 2 else 0.0
+        found["spike"].append(SPIKE_OVER * outstanding + 4 * _step(x))
+        found["still"].append(max(STILL_LEAST, STILL_OVER * longest_run(x)))
+        counts = np.array_equal(x, np.round(x)) and x.min() > SENSOR_STOPS[0] and x.max() < SENSOR_STOPS[1]
         low, high = SENSOR_STOPS if counts else (-NO_STOP, NO_STOP)
         found["low"].append(low)
         found["high"].append(high)
@@ -140,79 +243,7 @@ def _outstanding(x: np.ndarray) -> np.ndarray:
     return np.where(before * after > 0, np.minimum(abs(before), abs(after)), 0.0)
 
 
-def _widest(parts: list, length: int) -> np.ndarray:
+def _widest(part: np.ndarray, length: int) -> np.ndarray:
     """Farthest from lowest to highest sample of any window, by channel."""
-    hop = max(1, length // 4)
-    windows = (sliding_window_view(p, length, axis=0)[::hop] for p in parts if len(p) >= length)
-    return np.maximum(np.max([np.ptp(each, axis=-1).max(axis=0) for each in windows], axis=0), 1.0)
-
-
-def _calibrate(model: SpectralModel, fitted: list[Fitted], parts: list, labels, folds, base: int) -> None:
-    """Temper and doubt, from decisions of twins on recordings that they have not seen."""
-    twins = [
-        SpectralModel(model.classes, model.rate_hz, [f.twins[n] for f in fitted], model.limits, model.window_ms)
-        for n in range(len(fitted[0].twins))
-    ]
-    chance = -float(np.expm1(-1000.0 * model.hazard * base / (model.window_ms * model.rate_hz)))
-    course = _course(_decisions(twins, parts, folds, base), labels, round(1.0 / chance))
-    model.temper = min(TEMPERS, key=lambda temper: _filter_loss(*course, temper, chance))
-    for twin in twins:
-        twin.temper = model.temper
-    right, confidence = _scores(_decisions(twins, parts, folds, base), labels)
-    model.doubt = min(DOUBT, float(np.quantile(confidence, REFUSE_MOST)))
-    sequential = _decisions(twins, parts, folds, base, sequential=True)
-    right_sequential, sure = _scores(sequential, labels)
-    answered = right[confidence >= model.doubt]
-    model.figures = {
-        "window_samples": base,
-        "held_out_accuracy": round(float(right.mean()), 4),
-        "refused": round(float((confidence < model.doubt).mean()), 4),
-        "accuracy_of_answers": round(float(answered.mean()), 4),
-        "calibration_error": round(calibration_error(right, confidence), 4),
-        "sequential_accuracy": round(float(right_sequential.mean()), 4) if len(sure) else 0.0,
-        "sequential_calibration_error": round(calibration_error(right_sequential, sure), 4),
-        "sequential_samples": round(sum(d.samples for group in sequential for d in group) / max(1, len(sure)), 1),
-    }
-
-
-def _course(decisions: list[list], labels, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Log-likelihoods (m, classes) and true classes (m,) of windows in a row over many surfaces, of each at most so many at a time."""
-    stretches = {k: [] for k in sorted(set(labels))}
-    for group, k in zip(decisions, labels, strict=True):
-        stretches[k] += [[(d.loglik, k) for d in group[at : at + most]] for at in range(0, len(group), most)]
-    turns = zip_longest(*stretches.values(), fillvalue=[])
-    loglik, label = zip(*(window for turn in turns for stretch in turn for window in stretch), strict=True)
-    return np.array(loglik), np.array(label)
-
-
-def _filter_loss(loglik: np.ndarray, label: np.ndarray, temper: float, chance: float) -> float:
-    """Mean of -log posterior of the right class over a course of windows, nats."""
-    return -float(np.log(forward(loglik, temper, chance)[np.arange(len(label)), label]).mean())
-
-
-def calibration_error(right: np.ndarray, confidence: np.ndarray, bins: int = 10) -> float:
-    """Expected calibration error of decisions (m,) over equal bins of confidence."""
-    place = np.minimum((confidence * bins).astype(int), bins - 1)
-    each = [(place == b).mean() * abs(right[place == b].mean() - confidence[place == b].mean()) for b in set(place)]
-    return float(np.sum(each))
-
-
-def _novelty(model: SpectralModel, parts, labels, folds, base: int):
-    """The classifier's features of windows of the base length; None without such a classifier."""
-    classifier = next((r for r in model.classifiers if r.length == base), None)
-    if classifier is None:
-        return None
-    rows = [p[: len(p) // base * base].reshape(-1, base, p.shape[1]) for p in parts]
-    bands = len(classifier.centre) - len(classifier.shape)
-    return fit_novelty([classifier.expand(r)[:, :bands] for r in rows], labels, folds, base)
-
-
-def _decisions(twins: list[SpectralModel], parts, folds, window: int, sequential: bool = False) -> list[list]:
-    return [twins[f].judge(part, window, sequential) for part, f in zip(parts, folds, strict=True)]
-
-
-def _scores(decisions: list[list], labels) -> tuple[np.ndarray, np.ndarray]:
-    """Whether each decision's likeliest class is right, and its confidence."""
-    pairs = [(d.best == k, d.confidence) for group, k in zip(decisions, labels, strict=True) for d in group]
-    right, confidence = np.array(pairs, dtype=float).reshape(-1, 2).T
-    return right, confidence
+    windows = sliding_window_view(part, length, axis=0)[:: max(1, length // 4)]
+    return np.maximum(np.ptp(windows, axis=-1).max(axis=0), 1.0)
