@@ -21,10 +21,10 @@ enum { NAV_TEXTURE_ROW = 16 }; /* windows that a mean rests on; older ones fade 
 /* F: features, K: classes. All arrays are copied. */
 struct nav_texture_novelty_numbers {
     int classes, features;
-    const double *turn;      /* [F][F] row f: what feature f adds along each axis */
-    const double *mean;      /* [K][F] turned */
-    const double *row;       /* [F] variance of rows about the mean, >= 0 */
-    const double *limit;     /* [NAV_TEXTURE_ROW] of the distance of 1, 2, .. windows, > 0 */
+    const double *turn;  /* [F][F] row f: what feature f adds along each axis */
+    const double *mean;  /* [K][F] turned */
+    const double *row;   /* [F] variance of rows about the mean, >= 0 */
+    const double *limit; /* [NAV_TEXTURE_ROW] of the distance of 1, 2, .. windows, > 0 */
 };
 
 /* NULL when a size or number is out of range or memory is short. */
