@@ -81,7 +81,8 @@ def test_wrong_arguments_are_one_line(capsys, arguments, complaint):
 @pytest.mark.parametrize(("lanes", "mask"), [(6, 0x3F), (8, 0xFF), (28, 0xFFFFFFF)])
 def test_the_simulated_bridge_and_its_daemon_have_the_same_lanes(monkeypatch, tmp_path, lanes, mask):
     monkeypatch.setattr(bridge_sim, "program", lambda name: name)
-    words = bridge_sim._command(parser_of("bridge-sim").parse_args(["bridge-sim", "--lanes", str(lanes)]), tmp_path)
+    arguments = parser_of("bridge-sim").parse_args(["bridge-sim", "--lanes", str(lanes)])
+    words, _ = bridge_sim._command(arguments, tmp_path, threading.Event())
     reported = {name: words[words.index(name) + 1] for name in ("--lanes-populated", "--lane-mask")}
     assert reported == {"--lanes-populated": str(lanes), "--lane-mask": str(mask)}
 
