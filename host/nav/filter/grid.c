@@ -3,7 +3,6 @@
  * A cell's likelihood is the mean over its sub-poses, so that a border that cuts a cell counts by its share. Where the
  * robot cannot stand the likelihood is 0. Motion is put off until something is read: one pass then does for several
  * rows, and nothing is lost, since motions compose exactly. */
-#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,10 +21,12 @@ static const double LIGHT = 1e-4; /* by cells with more mass than this */
 struct grid {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
+    struct nav_cell wanted; /* cells that the scene asks for */
     struct nav_expected *expected;
     struct nav_histogram histogram;
     struct nav_weigh weigh;
-    struct nav_layer *layer;    /* [slices] where each lies in the tables */
+    int slice;                  /* whose place in the tables is */
+    struct nav_layer layer;     /* this */
     struct nav_pending pending; /* since the last update */
     struct nav_pose mean;       /* near the mode, at the last update */
     double near;                /* before the present row: from SURE on it judges its readings, and the odometry */
@@ -40,16 +41,7 @@ static void grid_destroy(void *self)
     nav_likelihood_free(g->likelihood);
     nav_expected_free(g->expected);
     nav_histogram_free(&g->histogram);
-    free(g->layer);
     free(g);
-}
-
-static void grid_find_layers(struct grid *g)
-{
-    const struct nav_histogram *h = &g->histogram;
-    for (int p = 0; p < h->shape.nh; p++)
-        g->layer[p] = nav_expected_layer(g->expected, nav_histogram_heading(h, p), nav_histogram_shift_x(h, p),
-                                         nav_histogram_shift_y(h, p));
 }
 
 /* Adds what a cell near the pose expected expects, before it is weighed; light ones are left out. */
@@ -65,7 +57,7 @@ static void grid_expect_cell(struct grid *g, int p, int line, int column, double
     if (hypot(x, y) > NAV_NEAR_M || fabs(nav_wrap(turn)) > NAV_NEAR_RAD)
         return;
     for (int n = 0; n < poses; n++) {
-        const uint8_t *codes = nav_expected_codes(g->expected, &g->layer[p], line, column, n);
+        const uint8_t *codes = nav_expected_codes(g->expected, &g->layer, line, column, n);
         if (codes)
             nav_trust_add(g->likelihood, codes, mass / poses);
     }
@@ -74,7 +66,12 @@ static void grid_expect_cell(struct grid *g, int p, int line, int column, double
 static long grid_weigh_group(void *self, int p, int line, int group, const float *mass, float *like)
 {
     struct grid *g = self;
-    nav_expected_mean(g->expected, &g->layer[p], line, group * NAV_LANES, mass, like);
+    const struct nav_histogram *h = &g->histogram;
+    if (g->slice != p)
+        g->layer = nav_expected_layer(g->expected, nav_histogram_heading(h, p), nav_histogram_shift_x(h, p),
+                                      nav_histogram_shift_y(h, p));
+    g->slice = p;
+    nav_expected_mean(g->expected, &g->layer, line, group * NAV_LANES, mass, like);
     for (int k = 0; k < NAV_LANES && g->sure; k++)
         grid_expect_cell(g, p, line, group * NAV_LANES + k, (double)mass[k]);
     return 0;
@@ -88,16 +85,14 @@ static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
     enum { PASSES_MOST = 25 };
     struct nav_histogram *h = &g->histogram;
     for (int n = 0; n < PASSES_MOST && nav_histogram_debt(h) > 1.0 && h->total > 0.0; n++) {
-        nav_histogram_begin(h, step, &noise, g->mean);
-        nav_histogram_run(h, LONG_MAX);
+        nav_histogram_pass(h, step, &noise, g->mean);
         step = (struct nav_pose){0.0, 0.0, 0.0};
     }
     if (!(h->total > 0.0))
         return false;
     g->weigh = (struct nav_weigh){.group = grid_weigh_group, .self = g, .extra = extra};
-    nav_histogram_begin(h, step, &g->weigh, g->mean);
-    grid_find_layers(g);
-    nav_histogram_run(h, LONG_MAX);
+    g->slice = -1;
+    nav_histogram_pass(h, step, &g->weigh, g->mean);
     return h->total > 0.0 && isfinite(h->total);
 }
 
@@ -147,13 +142,11 @@ static bool grid_make_tables(struct grid *g)
     const struct nav_settings *s = &problem->settings;
     const struct nav_shape *shape = &g->histogram.shape;
     int sub = (int)s->grid.sub, turns = (int)s->grid.sub_heading;
-    /* A look-up stands for poses within half a step and half a turn: that spreads the distances it should give. */
-    double blur = hypot(shape->cell / sub, NAV_LEVER_M * shape->cell_theta / turns) / sqrt(12.0);
+    double blur = nav_cell_blur(shape->cell, shape->cell_theta, g->wanted.lever, sub, turns);
     g->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, blur);
     if (g->likelihood)
         g->expected = nav_expected_new(g->likelihood, shape->cell, shape->nh, sub, turns);
-    g->layer = calloc((size_t)shape->nh, sizeof *g->layer);
-    return g->expected && g->layer;
+    return g->expected;
 }
 
 static void *grid_create(const struct nav_problem *problem)
@@ -164,11 +157,14 @@ static void *grid_create(const struct nav_problem *problem)
         return NULL;
     g->problem = problem;
     nav_calibration_init(&g->calibration);
+    struct nav_cell cell = {.edge = 0.0};
+    bool found = !nav_problem_cell(problem, 0.0, &g->wanted) && !nav_problem_cell(problem, s->grid.cell_m, &cell);
+    cell.heading = s->grid.cell_deg > 0.0 ? s->grid.cell_deg * NAV_PI / 180.0 : cell.heading;
     const struct nav_levels levels = {.size_x = problem->arena.size_x,
                                       .size_y = problem->arena.size_y,
-                                      .cell = s->grid.cell_m,
-                                      .headings = (int)fmax(round(360.0 / s->grid.cell_deg), 1.0)};
-    if (nav_histogram_init(&g->histogram, &levels, 0, 0) || !grid_make_tables(g)) {
+                                      .cell = cell.edge,
+                                      .headings = nav_cell_headings(&cell)};
+    if (!found || nav_histogram_init(&g->histogram, &levels, 0, 0) || !grid_make_tables(g)) {
         grid_destroy(g);
         return NULL;
     }
@@ -198,8 +194,7 @@ static void grid_carry(struct grid *g)
     const struct nav_weigh more = {.extra = each};
     if (!(g->histogram.total > 0.0) || g->histogram.uniform)
         return;
-    nav_histogram_begin(&g->histogram, (struct nav_pose){0.0, 0.0, 0.0}, &more, g->mean);
-    nav_histogram_run(&g->histogram, LONG_MAX);
+    nav_histogram_pass(&g->histogram, (struct nav_pose){0.0, 0.0, 0.0}, &more, g->mean);
     g->near *= 1.0 - NAV_CARRIED;
 }
 
@@ -259,9 +254,8 @@ static long grid_components(const void *self, struct nav_component *out, long ro
 static struct nav_resolution grid_resolution(const void *self)
 {
     const struct grid *g = self;
-    double finest = nav_sensors_detail(&g->likelihood->sensors).detail;
     const struct nav_shape *s = &g->histogram.shape;
-    return (struct nav_resolution){s->cell, s->cell_theta, fmin(s->cell, finest / 2.0), 0.0};
+    return (struct nav_resolution){s->cell, s->cell_theta, fmin(s->cell, g->wanted.edge), 0.0};
 }
 
 const struct nav_filter_ops nav_grid_filter = {.name = "grid",
