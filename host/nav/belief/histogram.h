@@ -63,6 +63,14 @@ struct nav_weigh {
     double extra; /* belief added to each cell before that */
 };
 
+/* Rows whose hazard is given at once, since a pass that gives it visits every cell: a robot that was carried is looked
+ * for at most so much later. */
+enum { NAV_HAZARD_ROWS = 16 };
+
+/* A cell is dropped that holds less than this share of what a uniform belief gives each: it is below what a hazard of
+ * 1e-3 gives in so many rows. */
+#define NAV_SHARE_LEAST 0.01
+
 struct nav_pass;
 
 struct nav_histogram {

@@ -15,9 +15,6 @@ static const double JOBS_OWED_MOST = 16.0;
  * sometimes. */
 static const double BLOCKED = 1e-3;
 
-/* A cell is dropped that holds less than this share of what a uniform belief gives each. */
-static const double SHARE_LEAST = 0.01;
-
 /* Cells passed over in a row, at 10 ns each: no further job begins beyond them, so that a row takes 10 ms at most where
  * a pass over the whole arena takes no longer. What one pose expects takes as long as passing over so many. */
 enum { ROW_CELLS = 500000, EXPECT_CELLS = 20 };
@@ -171,7 +168,17 @@ static long global_work_out(void *self, int p, int line, int group, const float 
     return EXPECT_CELLS * poses;
 }
 
-static void global_pass(struct adaptive_global *g, struct adaptive_log *log)
+/* What every cell is given of the chance that the robot was put there; finer cells than the first are not all held. */
+static double global_hazard(struct adaptive_global *g, double hazard)
+{
+    double rows = (double)(g->job.end - g->hazarded);
+    if (!(hazard > 0.0) || rows < NAV_HAZARD_ROWS || g->histogram.uniform || g->histogram.level != g->first.level)
+        return 0.0;
+    g->hazarded = g->job.end;
+    return fmin(rows, NAV_HAZARD_ROWS) * hazard / nav_shape_inside(&g->histogram.shape);
+}
+
+static void global_pass(struct adaptive_global *g, struct adaptive_log *log, double hazard)
 {
     struct nav_histogram *h = &g->histogram;
     global_read_job(g, log);
@@ -188,7 +195,8 @@ static void global_pass(struct adaptive_global *g, struct adaptive_log *log)
         nav_expected_begin(g->expected, (const float *const *)g->factor, (float)(BLOCKED * exp(-g->job.reference)));
     g->weigh = (struct nav_weigh){.group = first ? global_look_up : global_work_out,
                                   .self = g,
-                                  .least = SHARE_LEAST / g->first.cells};
+                                  .least = NAV_SHARE_LEAST / g->first.cells,
+                                  .extra = global_hazard(g, hazard)};
     g->touched += nav_histogram_pass(h, g->job.step, &g->weigh, nav_compose(g->summary.mean, g->job.step));
 }
 
@@ -225,10 +233,10 @@ static void global_count(struct adaptive_global *g)
 
 /* While even the heaviest cell is worth less than several hypotheses, or cells are still to be refined, there are too
  * many for a cloud. */
-static void global_take_job(struct adaptive_global *g, struct adaptive_log *log)
+static void global_take_job(struct adaptive_global *g, struct adaptive_log *log, double hazard)
 {
     struct nav_histogram *h = &g->histogram;
-    global_pass(g, log);
+    global_pass(g, log, hazard);
     bool refined = h->level > 0 && h->total > 0.0 && 8 * h->cells <= REFINED_MOST && nav_histogram_refine(h);
     g->scattered = 1.0;
     global_end(g);
@@ -237,19 +245,19 @@ static void global_take_job(struct adaptive_global *g, struct adaptive_log *log)
         global_count(g);
 }
 
-void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log)
+void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log, double hazard)
 {
     if (log->head - g->next > ADAPTIVE_ROWS_KEPT) /* rows that it has not seen are overwritten */
         adaptive_global_restart(g, adaptive_log_reach(log));
     for (g->touched = g->distinct = 0; g->next != log->head && g->touched < ROW_CELLS;)
-        global_take_job(g, log);
+        global_take_job(g, log, hazard);
 }
 
 void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
 {
     const struct nav_arena *arena = &g->problem->arena;
     nav_histogram_restart(&g->histogram, g->first.level);
-    g->next = row;
+    g->next = g->hazarded = row;
     g->gained = 0.0;
     g->scattered = 1.0;
     g->summary.mean = nav_gaussian_uniform(arena).mean;
@@ -369,7 +377,8 @@ static int global_first_level(const struct adaptive_global *g, const struct nav_
     for (int level = 0; level < LEVELS; level++) {
         struct nav_shape shape = nav_levels_shape(levels, level);
         double cells = nav_shape_inside(&shape);
-        if ((g->open * cells <= few && cells <= CELLS_MOST) || (2.0 * shape.cell > g->cell.pattern / 2.0 && cells <= CELLS_MOST))
+        if ((g->open * cells <= few && cells <= CELLS_MOST) ||
+            (2.0 * shape.cell > g->cell.pattern / 2.0 && cells <= CELLS_MOST))
             return level;
     }
     return LEVELS;
@@ -396,9 +405,8 @@ static int global_tables(struct adaptive_global *g)
 int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem, const struct nav_ground *ground)
 {
     struct nav_levels levels;
-    *g = (struct adaptive_global){.problem = problem, 
-                                  .room = floor(problem->settings.adaptive.most),
-                                  .open = ground->open};
+    *g = (struct adaptive_global){
+        .problem = problem, .room = floor(problem->settings.adaptive.most), .open = ground->open};
     if (global_levels(g, &levels))
         return -1;
     g->first.level = global_first_level(g, &levels);

@@ -15,10 +15,10 @@
 /* Some rows on their way into the belief. */
 struct adaptive_job {
     struct nav_pose step;
-    double reference;         /* log-likelihood of the best codes: factors are relative to it */
-    double local;             /* log-likelihood of its rows by the local belief */
-    uint64_t end;             /* first row after it */
-    bool uniform;             /* what it began from */
+    double reference; /* log-likelihood of the best codes: factors are relative to it */
+    double local;     /* log-likelihood of its rows by the local belief */
+    uint64_t end;     /* first row after it */
+    bool uniform;     /* what it began from */
 };
 
 /* The level that it begins with. */
@@ -46,10 +46,11 @@ struct adaptive_global {
     struct adaptive_first first;
     struct nav_cell cell; /* the finest level's */
     double wanted;        /* m, its edge where no user sets another */
-    double open;    /* share of the cells that can hold mass: the ground's */
-    float **factor; /* [whiskers][codes] log-likelihood of the present job */
+    double open;          /* share of the cells that can hold mass: the ground's */
+    float **factor;       /* [whiskers][codes] log-likelihood of the present job */
     struct adaptive_job job;
     uint64_t next;           /* first row of the log that it has not seen */
+    uint64_t hazarded;       /* row up to which the hazard was given */
     double gained;           /* log-likelihood of the rows seen, less the local belief's, since the restart */
     struct nav_mode summary; /* where it holds most, at row `next` - 1 */
     double room;             /* hypotheses that a cloud could hold */
@@ -72,8 +73,9 @@ void adaptive_global_clear(struct adaptive_global *, uint64_t row);
  * worth. */
 double adaptive_global_fill(struct adaptive_global *);
 
-/* Takes rows from the log until it has seen them all, or the next ones are better left to the next row. */
-void adaptive_global_work(struct adaptive_global *, struct adaptive_log *);
+/* Takes rows from the log until it has seen them all, or the next ones are better left to the next row. hazard: as
+ * motion.hazard, of a belief that is all there is; 0 else. */
+void adaptive_global_work(struct adaptive_global *, struct adaptive_log *, double hazard);
 
 /* Whether every row of the log has been seen. */
 bool adaptive_global_current(const struct adaptive_global *, const struct adaptive_log *);

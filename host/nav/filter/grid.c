@@ -1,8 +1,8 @@
 /* The exact filter: equation 4 on a grid over the whole arena.
  *
  * A cell's likelihood is the mean over its sub-poses, so that a border that cuts a cell counts by its share. Where the
- * robot cannot stand the likelihood is 0. Motion is put off until something is read: one pass then does for several
- * rows, and nothing is lost, since motions compose exactly. */
+ * robot cannot stand the likelihood is 0. A cell that holds less than the hazard gives is dropped. Motion is put off
+ * until something is read: one pass then does for several rows, and nothing is lost, since motions compose exactly. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +18,9 @@
 static const double SURE = 0.5;   /* confidence from which a belief judges whiskers, */
 static const double LIGHT = 1e-4; /* by cells with more mass than this */
 
+/* Cells narrower than a belief's widest, at most: 50 bytes each with their tables. */
+static const double CELLS_MOST = 2.5e6;
+
 struct grid {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
@@ -31,6 +34,7 @@ struct grid {
     struct nav_pose mean;       /* near the mode, at the last update */
     double near;                /* before the present row: from SURE on it judges its readings, and the odometry */
     bool sure;
+    long unhazarded; /* rows read since the hazard was last given */
     struct nav_calibration calibration;
     struct nav_motion last; /* motion of the row before, as applied */
 };
@@ -77,6 +81,16 @@ static long grid_weigh_group(void *self, int p, int line, int group, const float
     return 0;
 }
 
+/* What every cell is given of the chance that the robot was put there. */
+static double grid_hazard(struct grid *g)
+{
+    double hazard = g->problem->settings.motion.hazard;
+    if (++g->unhazarded < NAV_HAZARD_ROWS || g->histogram.uniform)
+        return 0.0;
+    g->unhazarded = 0;
+    return NAV_HAZARD_ROWS * hazard / nav_shape_inside(&g->histogram.shape);
+}
+
 /* Moves, multiplies by the likelihood and normalises; `extra` is added to each cell first. Returns false with no mass.
  */
 static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
@@ -90,7 +104,11 @@ static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
     }
     if (!(h->total > 0.0))
         return false;
-    g->weigh = (struct nav_weigh){.group = grid_weigh_group, .self = g, .extra = extra};
+    double least = NAV_SHARE_LEAST / nav_shape_inside(&h->shape);
+    g->weigh = (struct nav_weigh){.group = grid_weigh_group,
+                                  .self = g,
+                                  .least = g->problem->settings.motion.hazard > 0.0 ? least : 0.0,
+                                  .extra = extra};
     g->slice = -1;
     nav_histogram_pass(h, step, &g->weigh, g->mean);
     return h->total > 0.0 && isfinite(h->total);
@@ -149,6 +167,18 @@ static bool grid_make_tables(struct grid *g)
     return g->expected;
 }
 
+/* The scene's cells, or wider ones where these would be too many. */
+static int grid_find_cell(struct grid *g, struct nav_cell *cell)
+{
+    const struct nav_arena *arena = &g->problem->arena;
+    double given = g->problem->settings.grid.cell_m, area = arena->size_x * arena->size_y;
+    int failed = nav_problem_cell(g->problem, 0.0, &g->wanted) || nav_problem_cell(g->problem, given, cell);
+    while (!failed && given <= 0.0 && cell->edge < NAV_EDGE_MOST_M &&
+           area / (cell->edge * cell->edge) * nav_cell_headings(cell) > CELLS_MOST)
+        failed = nav_problem_cell(g->problem, fmin(2.0 * cell->edge, NAV_EDGE_MOST_M), cell);
+    return failed;
+}
+
 static void *grid_create(const struct nav_problem *problem)
 {
     const struct nav_settings *s = &problem->settings;
@@ -157,8 +187,8 @@ static void *grid_create(const struct nav_problem *problem)
         return NULL;
     g->problem = problem;
     nav_calibration_init(&g->calibration);
-    struct nav_cell cell = {.edge = 0.0};
-    bool found = !nav_problem_cell(problem, 0.0, &g->wanted) && !nav_problem_cell(problem, s->grid.cell_m, &cell);
+    struct nav_cell cell;
+    bool found = grid_find_cell(g, &cell) == 0;
     cell.heading = s->grid.cell_deg > 0.0 ? s->grid.cell_deg * NAV_PI / 180.0 : cell.heading;
     const struct nav_levels levels = {.size_x = problem->arena.size_x,
                                       .size_y = problem->arena.size_y,
@@ -223,7 +253,7 @@ static void grid_update(void *self, const struct nav_evidence *evidence)
     nav_likelihood_read(g->likelihood, evidence);
     grid_expect(g, false);
     nav_trust_begin(g->likelihood);
-    if (!grid_reweigh(g, step, g->problem->settings.grid.teleport / nav_shape_inside(&g->histogram.shape)))
+    if (!grid_reweigh(g, step, grid_hazard(g)))
         grid_forget(g);
     if (sure)
         nav_trust_learn(g->likelihood);

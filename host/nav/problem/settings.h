@@ -43,6 +43,7 @@ struct nav_motion_settings {
     double drift_rad; /* heading error of a straight metre, standard deviation */
     double calibrate; /* 1: learns constant errors of the odometry (calibration.h), where the filter can */
     double gaps;      /* 1: estimates the motion of rows that never came (gap.h); 0: takes it as none */
+    double hazard;    /* probability at any row read that the robot has been put to another place; grid, adaptive */
 };
 
 struct nav_grid_settings {
@@ -50,7 +51,6 @@ struct nav_grid_settings {
     double cell_deg;    /* its extent in heading; 0: as its edge asks */
     double sub;         /* likelihood: sub-poses per cell edge */
     double sub_heading; /* likelihood: sub-poses per cell heading */
-    double teleport;    /* probability per reading that the robot has been put to another place */
 };
 
 struct nav_foveal_settings {
@@ -81,7 +81,6 @@ struct nav_adaptive_settings {
     double gain;          /* prior standard deviation of the odometry's gains */
     double cell_m;        /* edge of the arena-wide histogram's finest cells, bins half as wide; 0: as the scene's detail
                              asks */
-    double hazard;        /* probability at any row that the robot has been put to another place */
     double wake;          /* odds of a kidnap at which the histogram wakes */
     double scattered;     /* share of the histogram that a cloud may leave out */
 };

@@ -47,7 +47,7 @@ static void write(struct belief *b, struct nav_noise noise, const double *textur
 
 static void work(struct belief *b)
 {
-    adaptive_global_work(&b->g, &b->log);
+    adaptive_global_work(&b->g, &b->log, 0.0);
 }
 
 /* A belief in few cells costs no more than these, however large the arena. */
@@ -68,7 +68,8 @@ static void a_job_passes_over_what_holds_mass_and_nothing_else(void **state)
     end(&b);
 }
 
-/* While the belief is wide, rows wait: none begins a further pass over the arena than fits, and all are caught up with. */
+/* While the belief is wide, rows wait: none begins a further pass over the arena than fits, and all are caught up with.
+ */
 static void rows_wait_while_the_belief_is_wide(void **state)
 {
     (void)state;
@@ -89,8 +90,8 @@ static void rows_wait_while_the_belief_is_wide(void **state)
     end(&b);
 }
 
-/* However large the arena, its first pass fits a row, or cells are as wide as the tiles allow; it says so, and its memory
- * stays. */
+/* However large the arena, its first pass fits a row, or cells are as wide as the tiles allow; it says so, and its
+ * memory stays. */
 static void large_arenas_begin_in_wide_cells(void **state)
 {
     (void)state;
@@ -102,6 +103,27 @@ static void large_arenas_begin_in_wide_cells(void **state)
     assert_true(adaptive_global_bytes(&b.g) < 64e6);
     assert_near(b.g.first.too_wide, b.g.histogram.shape.cell, 0.0); /* above half a tile: it says so */
     assert_true(b.g.first.too_wide > 0.25);
+    end(&b);
+}
+
+/* A belief that is all there is, and sure of one place, is given the chance of a kidnap, some rows' at once. */
+static void a_robot_may_be_carried_while_nothing_else_is_held(void **state)
+{
+    (void)state;
+    const double hazard = 1e-3;
+    struct belief b;
+    begin(&b, 2.0);
+    adaptive_global_clear(&b.g, 0);
+    adaptive_global_add(&b.g, (struct nav_pose){1.01, 1.01, 0.3}, 1.0);
+    adaptive_global_added(&b.g);
+    for (int k = 1; k <= NAV_HAZARD_ROWS; k++) {
+        assert_int_equal(b.g.histogram.cells, k > 1 ? 1 : b.g.histogram.cells);
+        write(&b, NO_NOISE, NULL);
+        adaptive_global_work(&b.g, &b.log, hazard);
+    }
+    double all = nav_shape_inside(&b.g.histogram.shape);
+    assert_near((double)b.g.histogram.cells, all, 0.0);
+    assert_near(1.0 - (double)b.g.histogram.heaviest / b.g.histogram.total, NAV_HAZARD_ROWS * hazard, 1e-3);
     end(&b);
 }
 
@@ -221,6 +243,7 @@ int main(void)
         cmocka_unit_test(a_job_passes_over_what_holds_mass_and_nothing_else),
         cmocka_unit_test(rows_wait_while_the_belief_is_wide),
         cmocka_unit_test(large_arenas_begin_in_wide_cells),
+        cmocka_unit_test(a_robot_may_be_carried_while_nothing_else_is_held),
         cmocka_unit_test(what_is_scattered_is_a_share_of_the_mass),
         cmocka_unit_test(an_impossible_likelihood_is_worked_out_once),
         cmocka_unit_test(coarse_cells_are_refined_where_mass_is),

@@ -160,7 +160,7 @@ def test_settings_reach_the_filter(capsys, folder):
     for cell in ("0.05", "0.1"):
         _, out, _ = run(capsys, "localise", folder, "--filter", "grid", "--set", f"grid.cell_m={cell}", "--json")
         states.append(json.loads(out)["peak_states"])
-    assert states == [90000, 22500]
+    assert states == [50 * 50 * 53, 25 * 25 * 38]
 
 
 def test_lists_and_help(capsys):
