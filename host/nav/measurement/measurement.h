@@ -116,8 +116,8 @@ double nav_model_lever(const struct nav_model *);
  * and turned by no more than moves the farthest such sensor, `lever` m from the robot's centre, by part of that. */
 struct nav_cell {
     double edge, heading, lever; /* m, rad, m */
-    double pattern;              /* m, finest detail of what is no distance: wider cells average it away, where they only
-                                    blur a distance */
+    double pattern; /* m, finest detail of what is no distance: wider cells average it away, where they only
+                       blur a distance */
 };
 
 #define NAV_EDGE_MOST_M (NAV_NEAR_M / 5.0) /* a belief is no coarser, however little its sensors tell apart */
@@ -131,8 +131,8 @@ int nav_problem_cell(const struct nav_problem *, double edge_m, struct nav_cell 
 /* Slices of a whole turn that are no wider than a cell's heading. */
 int nav_cell_headings(const struct nav_cell *);
 
-/* Standard deviation of a contact's distance over the poses that a look-up stands for, `sub` of them per edge and `turns`
- * per heading of a cell, m. */
+/* Standard deviation of a contact's distance over the poses that a look-up stands for, `sub` of them per edge and
+ * `turns` per heading of a cell, m. */
 double nav_cell_blur(double edge, double heading, double lever, int sub, int turns);
 
 /* Farthest point from the robot's centre that its body or a sensor reaches, m. */

@@ -75,14 +75,14 @@ struct nav_particle_settings {
 };
 
 struct nav_adaptive_settings {
-    double most;          /* particles, at most */
-    double least;         /* particles, at least */
-    double per_bin;       /* particles in each bin, half a cell each way, that they occupy */
-    double gain;          /* prior standard deviation of the odometry's gains */
-    double cell_m;        /* edge of the arena-wide histogram's finest cells, bins half as wide; 0: as the scene's detail
-                             asks */
-    double wake;          /* odds of a kidnap at which the histogram wakes */
-    double scattered;     /* share of the histogram that a cloud may leave out */
+    double most;      /* particles, at most */
+    double least;     /* particles, at least */
+    double per_bin;   /* particles in each bin, half a cell each way, that they occupy */
+    double gain;      /* prior standard deviation of the odometry's gains */
+    double cell_m;    /* edge of the arena-wide histogram's finest cells, bins half as wide; 0: as the scene's detail
+                         asks */
+    double wake;      /* odds of a kidnap at which the histogram wakes */
+    double scattered; /* share of the histogram that a cloud may leave out */
 };
 
 struct nav_settings {
