@@ -230,8 +230,8 @@ def test_columns_of_radial_recordings(tmp_path):
 def test_fields_of_radial_models():
     fields = {
         radial_models.FORMAT: {*radial_models.FIELDS},
-        radial_models.CURVE_FORMAT: {"kind", *CurveModel.NUMBERS},
-        radial_models.PRESS_FORMAT: {"unit", "axes", *press.PressModel.NUMBERS, "stages"},
+        radial_models.CURVE_FORMAT: {*CurveModel.NUMBERS},
+        radial_models.PRESS_FORMAT: {"unit", "axes", *press.PressModel.NUMBERS, "stages", "curve"},
         radial_models.WHISK_FORMAT: {*WhiskModel.SCALARS, *WhiskModel.ARRAYS, "covariance"},
     }
     assert {name: row_of("Radial models", name) for name in column("Radial models")} == fields

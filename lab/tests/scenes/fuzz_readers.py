@@ -132,7 +132,7 @@ def seeds(folder: Path, made: Scene) -> list[tuple]:
     texture.TextureModel.train({"A": [SAMPLES], "B": [SAMPLES * 2.0]}, bins=4).save(folder / "plain.json")
     radial.RadialModel(-0.011, 181.5, 2.5, 90.0, 138.0).save(folder / "radial.json")
     radii = np.linspace(90.0, 130.0, 9)
-    radial.save(radial.CurveModel.fit("rational", 3e3 / radii, radii), folder / "curve.json")
+    radial.save(radial.CurveModel.fit(3e3 / radii, radii), folder / "curve.json")
     readers = {name: lambda _: load(folder) for name in ("arena.toml", "robot.toml", "prior.toml")}
     readers |= {"observations.csv": lambda path: read_observations(path, made)}
     readers |= {"faults.toml": lambda path: read_faults(path, 2000)}

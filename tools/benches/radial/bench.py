@@ -1,4 +1,4 @@
-"""Radial distance: errors, sureness, time and stability of the paper's line, curves and whole whisks.
+"""Radial distance: errors, sureness, time and stability of the paper's line, a curve, whole whisks and presses.
 
 Whiskers are drawn from a batch (stiffness, creep, friction, gain), calibrated with the paper's 5 whisks at 6 radii, and
 judged on others.
@@ -21,7 +21,7 @@ from .trials import PAPER_MM, RADII_MM, SOURCES, SPOILS, SPREADS, Kind, Set, Whi
 
 CACHE = store.kept("radial")
 SEED = 48611  # chosen after the last change to the models; nothing was developed on these whiskers
-METHODS = ("paper", "quadratic", "rational", "whisk", "press", "default")
+METHODS = ("paper", "rational", "whisk", "press", "default")
 WHISKERS, FIT, HELD = 4, 5, 6  # whiskers of each spread; whisks at each radius
 TIP_WHISKERS = 24  # of each spread: shares near 98 % ask for many whisks
 LIMIT_MM, NEAR_MM = RADII_MM[-1] - 3.0, 3.0  # of tip and shaft; nearer to it nothing is asked

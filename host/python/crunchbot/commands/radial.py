@@ -13,10 +13,10 @@ from ..touch.radial import model as radial
 
 EXAMPLE = "whisker radial fit examples/contacts.csv --out contacts.json"
 COLUMNS = "whisk_rad_s and base_rad_s, or push_mm_s, or depth_mm; direction_deg of the touch"
-DOUBTED, DOUBTED_LEAST = 0.5, 3  # confidence; fewer contacts say nothing of the whisker
-KINDS = """paper or linear: equation 3, a line through the peaks; quadratic, rational: a curve instead; whisk: whole body
-whisks by the physics of the shaft, which the pilot needs to tell a face from a corner; press: a regression at several
-depths of a push, which answers during the press; default: the one that predicts left-out places best"""
+DOUBTED_LEAST = 3  # fewer contacts say nothing of the whisker
+KINDS = """paper or linear: equation 3, a line through the peaks; rational: a curve instead; whisk: whole body whisks by
+the physics of the shaft, which the pilot needs to tell a face from a corner; press: a regression at depths of a push, which
+answers during it, and the curve where it doubts; default: the one that predicts left-out places best"""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -74,7 +74,7 @@ def predict(arguments: argparse.Namespace) -> int:
         count = len(recorded.t_s)
         for end in (count * np.arange(1, 11) // 10) if arguments.during else (count,):
             sure = _predict(arguments, model, contact, recorded.until(end), None if arguments.during else peak)
-        doubted += sure < DOUBTED
+        doubted += sure < radial.PressModel.DOUBTED
     if doubted >= DOUBTED_LEAST and 2 * doubted > len(whisks.contact):
         text = f"{doubted} of {len(whisks.contact)} contacts are unlike those of calibration"
         warn(f"{arguments.contacts}: {text}; if whisker, sensor or channels have changed, record and fit anew")

@@ -86,10 +86,8 @@ def test_any_rate_and_number_of_channels(hz, channels):
 def test_curves_bend_with_the_plug(kappa):
     rng = np.random.default_rng(7)
     cal = whisks(rng, 5, 0.001, kappa=kappa)
-    line, quadratic, rational = (
-        rms(errors(radial.fit(cal, m).model, cal)) for m in ("linear", "quadratic", "rational")
-    )
-    assert line > 1.0 and quadratic < 0.55 * line and rational < 0.55 * line
+    line, rational = (rms(errors(radial.fit(cal, m).model, cal)) for m in ("linear", "rational"))
+    assert line > 1.0 and rational < 0.55 * line
 
 
 def spoil(contact: Contact, how: str, rng) -> Contact:

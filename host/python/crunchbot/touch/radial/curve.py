@@ -1,8 +1,11 @@
-"""Peak to radius by a parabola or a rational function: the paper's line bends when the plug is no match for the whisker."""
+"""The peak of a contact (equation 2), and peak to radius by a rational function: the paper's line bends when the plug is no
+match for the whisker."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...fields import Fields
+from ...native import as_doubles, doubles, lib
 from .whisk_fit import TIP_MM
 
 
@@ -32,66 +35,75 @@ LEAST_BELOW, BELOW_MOST = (
     50.0,
 )  # of the rational curve's denominator at the largest peak: no pole among the contacts
 GRID, ZOOMS = 21, 7
+SLACK = 0.1  # of the outermost radius, beyond those calibrated: where the curve still answers
+REST_SHARE = 0.05  # the first samples of a recorded whisk, before it touches, give its rest
+REST_LEAST = 3  # samples: slow recordings have few before the touch
+
+
+def peak(samples: np.ndarray, rest: ArrayLike) -> float:
+    """Equation 2: largest deflection about `rest` over a contact, counts. samples (n, axes); nan when none is finite."""
+    samples = as_doubles(samples, "samples", (None, None))
+    count, axes = samples.shape
+    rest = as_doubles(rest, "rest", (axes,))
+    return lib.nav_radial_peak(doubles(samples, "samples", (count, axes)), count, axes, doubles(rest, "rest", (axes,)))
+
+
+def peak_of(samples: np.ndarray) -> float:
+    """Equation 2 of a recorded contact (n, axes) about the median of its first samples, counts; nan when none is finite."""
+    finite = samples[np.isfinite(samples).all(axis=1)]
+    if len(finite) == 0:
+        return float("nan")
+    return peak(finite, np.median(finite[: max(REST_LEAST, int(REST_SHARE * len(finite)))], axis=0))
 
 
 class CurveModel(Known):
-    """r = (c0 + c1 f + c2 f^2)/(1 + d f), f = peak/scale: `quadratic` has d = 0, `rational` c2 = 0.
+    """r = (c0 + c1 f)/(1 + d f), f = peak/scale: exact for a conical whisker in a plug of any stiffness (whisker_physics
+    section 4)."""
 
-    The rational one is exact for a conical whisker in a plug of any stiffness (whisker_physics section 4).
-    """
+    NUMBERS = ("c0", "c1", "d", "scale", "sigma_mm", "low_mm", "high_mm")
 
-    KINDS = ("quadratic", "rational")
-    NUMBERS = ("c0", "c1", "c2", "d", "scale", "sigma_mm", "low_mm", "high_mm")
-
-    def __init__(self, content: dict):
-        """`content`: "kind" and NUMBERS by name."""
-        self.kind = content["kind"]
-        values = [float(content[name]) for name in self.NUMBERS]
-        self.c0, self.c1, self.c2, self.d, self.scale, self.sigma_mm, self.low_mm, self.high_mm = values
+    def __init__(self, numbers: dict[str, float]):
+        """`numbers`: NUMBERS by name."""
+        values = [float(numbers[name]) for name in self.NUMBERS]
+        self.c0, self.c1, self.d, self.scale, self.sigma_mm, self.low_mm, self.high_mm = values
 
     @classmethod
     def of(cls, fields: Fields) -> "CurveModel":
         """Makes a model from what `content` gave; ValueError names the field that is wrong."""
-        numbers = {name: fields.number(name) for name in cls.NUMBERS[:4]} | {"scale": fields.number("scale", LEAST)}
-        radii = zip(cls.NUMBERS[5:], radii_of(fields, *cls.NUMBERS[5:]), strict=True)
-        return cls({"kind": fields.text("kind", *cls.KINDS)} | numbers | dict(radii))
+        numbers = {name: fields.number(name) for name in cls.NUMBERS[:3]} | {"scale": fields.number("scale", LEAST)}
+        return cls(numbers | dict(zip(cls.NUMBERS[4:], radii_of(fields, *cls.NUMBERS[4:]), strict=True)))
 
     @property
     def content(self) -> dict:
         """What makes the same model again."""
-        return {"kind": self.kind} | {name: getattr(self, name) for name in self.NUMBERS}
+        return {name: getattr(self, name) for name in self.NUMBERS}
 
     @classmethod
-    def fit(cls, kind: str, peak_counts: np.ndarray, radius_mm: np.ndarray) -> "CurveModel":
+    def fit(cls, peak_counts: np.ndarray, radius_mm: np.ndarray) -> "CurveModel":
         """Least squares; sigma_mm is the RMS error of places left out. ValueError when they do not determine it."""
         peaks, radii = (np.asarray(v, np.float64) for v in (peak_counts, radius_mm))
         use = np.isfinite(peaks) & np.isfinite(radii)
         peaks, radii = peaks[use], radii[use]
         if len(peaks) < 5 or len(np.unique(peaks)) < 4:
             raise ValueError(
-                f"radial fit: {kind} needs at least 5 usable contacts of different peaks; record contacts at more radii"
+                "radial fit: a curve needs at least 5 usable contacts of different peaks; record contacts at more radii"
             )
         scale = float(np.abs(peaks).max())
-        numbers = cls._solve(kind, peaks / scale, radii)
-        model = cls(
-            {"kind": kind, "scale": scale, "low_mm": radii.min(), "high_mm": radii.max(), "sigma_mm": 0.0} | numbers
-        )
+        known = {"scale": scale, "low_mm": radii.min(), "high_mm": radii.max(), "sigma_mm": 0.0}
+        model = cls(known | cls._solve(peaks / scale, radii))
         left = []
         for place in np.unique(radii):
             kept = radii != place
             if len(np.unique(peaks[kept])) < 4:
                 kept[:] = True
-            without = cls(model.content | cls._solve(kind, peaks[kept] / scale, radii[kept]))
+            without = cls(known | cls._solve(peaks[kept] / scale, radii[kept]))
             left += [without.predict(one)[0] - place for one in peaks[radii == place]]
         model.sigma_mm = float(np.sqrt(np.mean(np.square(left))))
         return model
 
     @staticmethod
-    def _solve(kind: str, f: np.ndarray, radii: np.ndarray) -> dict:
-        """Least squares of the radii; given d, the rational curve is linear, and d is searched on ever finer grids."""
-        if kind == "quadratic":
-            c0, c1, c2 = np.linalg.lstsq(np.column_stack([np.ones(len(f)), f, f**2]), radii, rcond=None)[0]
-            return {"c0": c0, "c1": c1, "c2": c2, "d": 0.0}
+    def _solve(f: np.ndarray, radii: np.ndarray) -> dict[str, float]:
+        """Least squares of the radii; given d the curve is linear, and d is searched on ever finer grids."""
         low, high = np.log([LEAST_BELOW, BELOW_MOST])
         for _ in range(ZOOMS):
             tried = np.linspace(low, high, GRID)
@@ -101,14 +113,22 @@ class CurveModel(Known):
             best = int(np.argmin(left))
             low, high = tried[max(0, best - 1)], tried[min(GRID - 1, best + 1)]
         c0, c1 = found[best]
-        return {"c0": c0, "c1": c1, "c2": 0.0, "d": np.expm1(tried[best])}
+        return {"c0": c0, "c1": c1, "d": np.expm1(tried[best])}
 
     def predict(self, peak_counts: float) -> tuple[float, float]:
-        """(radius mm, sigma mm) of one contact; the radius is held where the curve is known, and 10 % beyond."""
+        """(radius mm, sigma mm) of one contact; the radius is held where the curve is known, and SLACK beyond."""
         f = peak_counts / self.scale
         below = 1.0 + self.d * f
         if not np.isfinite(f) or below <= 0.0:
             return (self.high_mm if np.isfinite(f) else float("nan")), self.high_mm - self.low_mm
-        slack = 0.1 * self.high_mm
-        mm = (self.c0 + self.c1 * f + self.c2 * f * f) / below
-        return float(np.clip(mm, self.low_mm - slack, self.high_mm + slack)), self.sigma_mm
+        return float(np.clip((self.c0 + self.c1 * f) / below, *self._known)), self.sigma_mm
+
+    def knows(self, radius_mm: float) -> bool:
+        """Whether an answer is the curve's own, and not held at the end of where it is known; False for nan."""
+        low, high = self._known
+        return low < radius_mm < high
+
+    @property
+    def _known(self) -> tuple[float, float]:
+        slack = SLACK * self.high_mm
+        return self.low_mm - slack, self.high_mm + slack

@@ -16,7 +16,7 @@ from ...files import read_json
 from ...native import as_doubles, doubles, ffi, lib
 from ...outputs import put
 from ...tables import TableError, Warn, ignore, numbers, read_columns
-from .curve import CurveModel, Known, radii_of
+from .curve import CurveModel, Known, peak, peak_of, radii_of
 from .faults import faulty, radii_of_contacts
 from .press import PressModel
 from .shape import Contact, shape_of
@@ -25,10 +25,8 @@ from .whisk_fit import TIP_MM
 
 FORMAT = "whisker radial model 1"
 FIELDS = ("a1", "a0", "sigma_mm", "low_mm", "high_mm")
-REST_SHARE = 0.05  # the first samples of a recorded whisk, before it touches, give its rest
-REST_LEAST = 3  # samples: slow recordings have few before the touch
-WHISK_FORMAT, CURVE_FORMAT = "whisker radial whisk model 1", "whisker radial curve model 1"
-PRESS_FORMAT = "whisker radial press model 1"
+WHISK_FORMAT, CURVE_FORMAT = "whisker radial whisk model 1", "whisker radial curve model 2"
+PRESS_FORMAT = "whisker radial press model 2"
 # How the base moves: turn commanded, turn as the base reports it, translation, depth. As the members of Contact.
 MOTION_COLUMNS = {
     "whisk_rad_s": "whisk_rad_s",
@@ -40,7 +38,7 @@ DIRECTION_COLUMN = "direction_deg"  # of the touch about the shaft
 NODE_MOST = 2**32 - 1
 NODE_COLUMN = "node"  # serial number of the node whose whisker it is
 NO_CHANNEL = ("contact", "radius_mm", "t_s", NODE_COLUMN, DIRECTION_COLUMN, *MOTION_COLUMNS)
-CANDIDATES = ("linear", "quadratic", "rational", "whisk", "press")
+CANDIDATES = ("linear", "rational", "whisk", "press")
 MODELS = ("paper", *CANDIDATES, "default")
 
 
@@ -53,14 +51,6 @@ class Estimate(NamedTuple):
     type: str
     confidence: float
     direction_deg: float | None = None
-
-
-def peak(samples: np.ndarray, rest: ArrayLike) -> float:
-    """Equation 2: largest deflection about `rest` over a contact, counts. samples (n, axes); nan when none is finite."""
-    samples = as_doubles(samples, "samples", (None, None))
-    count, axes = samples.shape
-    rest = as_doubles(rest, "rest", (axes,))
-    return lib.nav_radial_peak(doubles(samples, "samples", (count, axes)), count, axes, doubles(rest, "rest", (axes,)))
 
 
 class RadialModel(Known):
@@ -198,14 +188,6 @@ def _motion(text: dict[str, list[str]], name: str) -> np.ndarray | None:
     return values if np.any(known) else None
 
 
-def peak_of(samples: np.ndarray) -> float:
-    """Equation 2 of a recorded contact (n, axes) about the median of its first samples, counts; nan when none is finite."""
-    finite = samples[np.isfinite(samples).all(axis=1)]
-    if len(finite) == 0:
-        return float("nan")
-    return peak(finite, np.median(finite[: max(REST_LEAST, int(REST_SHARE * len(finite)))], axis=0))
-
-
 class Fitted(NamedTuple):
     """A model with its RMS errors, mm, of contacts predicted by a model fitted without them: without their whole place, and
     without that contact alone; nan where too few remain. tried: the same two errors of every model that was tried."""
@@ -247,8 +229,8 @@ def _best(errors: dict[str, np.ndarray], contacts: int) -> str:
 def _model_of(whisks: Whisks, name: str):
     if name in ("paper", "linear"):
         return RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
-    if name in CurveModel.KINDS:
-        return CurveModel.fit(name, whisks.peak_counts, whisks.radius_mm)
+    if name == "rational":
+        return CurveModel.fit(whisks.peak_counts, whisks.radius_mm)
     if name == "press":
         return PressModel.fit(whisks.recorded, whisks.radius_mm, whisks.direction_deg)
     return WhiskModel.fit(whisks.shapes, whisks.radius_mm, whisks.axes)

@@ -3,7 +3,8 @@
 At each depth, ln radius is linear in ln f, (ln f)^2 and the shape of the press so far: f is the length of the deflection
 over the channels, the shape is its direction and its length at a quarter and half of the depth. A conical whisker gives
 f as a rational function of the radius (whisker_physics section 4), which is close to a power law over a whisker's outer
-two thirds. Ridge regression, its strength chosen by the places left out; so is the standard deviation.
+two thirds. Ridge regression, its strength chosen by the places left out; so is the standard deviation. A whole contact
+that is unlike those calibrated, as one that slips late, is answered by that rational function of its peak.
 """
 
 import itertools
@@ -15,7 +16,7 @@ import numpy as np
 
 from ...fields import HUGE, Fields
 from ...native import as_doubles
-from .curve import LEAST, RADIUS_MOST_MM, Known
+from .curve import LEAST, RADIUS_MOST_MM, CurveModel, Known, peak_of
 from .shape import Contact
 
 STAGES = 16  # depths at which there is a regression, denser at the start
@@ -243,14 +244,23 @@ class Estimate(NamedTuple):
 
 
 class PressModel(Known):
-    """Stages by direction of the touch: one direction, None, where calibration names none."""
+    """Stages by direction of the touch: one direction, None, where calibration names none; and what answers where they
+    doubt."""
 
+    DOUBTED = 0.5  # confidence below which a press is more likely unlike those calibrated than like them
     NUMBERS = ("window", "low_mm", "high_mm", "place_mm", "contact_mm")
 
-    def __init__(self, unit: str, axes: int, numbers: dict[str, float], stages: dict[float | None, list[Stage]]):
+    def __init__(
+        self,
+        unit: str,
+        axes: int,
+        numbers: dict[str, float],
+        stages: dict[float | None, list[Stage]],
+        curve: CurveModel,
+    ):
         """unit: of depths. window: advance over which onsets are looked for. place_mm, contact_mm: RMS errors at the last
         depth of contacts predicted without their place, and without themselves; low_mm, high_mm: radii calibrated."""
-        self.unit, self.axes, self.stages = unit, axes, stages
+        self.unit, self.axes, self.stages, self.curve = unit, axes, stages, curve
         self.window, self.low_mm, self.high_mm, self.place_mm, self.contact_mm = (numbers[n] for n in self.NUMBERS)
         self.sigma_mm = self.place_mm
 
@@ -279,13 +289,28 @@ class PressModel(Known):
             errors.append(off)
         place_mm, contact_mm = (float(np.sqrt(np.mean(np.concatenate(off) ** 2))) for off in zip(*errors, strict=True))
         numbers = (window, float(radii[use].min()), float(radii[use].max()), place_mm, contact_mm)
-        return cls(units.pop(), contacts[0].samples.shape[1], dict(zip(cls.NUMBERS, numbers, strict=True)), stages)
+        curve = CurveModel.fit(np.array([peak_of(contact.samples) for contact in contacts]), radii)
+        return cls(
+            units.pop(), contacts[0].samples.shape[1], dict(zip(cls.NUMBERS, numbers, strict=True)), stages, curve
+        )
 
     def predict(self, contact: Contact) -> Estimate:
-        """The radius of a press, whole or so far. Before the first depth: the middle of the radii, and no confidence."""
+        """The radius of a press, whole or so far; of a whole one that is doubted, by the curve and with its deviation."""
         if advance_of(contact)[1] != self.unit:
             columns = " or ".join(name for name, unit in UNITS.items() if unit == self.unit and name)
             raise ValueError(f"the model is of pushes in {self.unit}; give the column {columns or 't_s alone'}")
+        grown = self._grown(contact)
+        if grown.confidence >= self.DOUBTED or not self._whole(contact):
+            return grown
+        mm, sigma_mm = self.curve.predict(peak_of(contact.samples))
+        return grown._replace(radius_mm=mm, sigma_mm=sigma_mm) if self.curve.knows(mm) else grown
+
+    def _whole(self, contact: Contact) -> bool:
+        """Whether a contact has advanced as far as those calibrated: only then do peaks compare."""
+        return DEEPEST_SHARE * self.window <= ONSET_SHARE * _reach(contact) < math.inf
+
+    def _grown(self, contact: Contact) -> Estimate:
+        """By the stages. Before the first depth: the middle of the radii, and no confidence."""
         press = press_of(contact, self.window)
         found = [] if press is None else [one for stages in self.stages.values() if (one := _answer(stages, press))]
         if not found:
@@ -311,7 +336,8 @@ class PressModel(Known):
             for direction, members in self.stages.items()
             for stage in members
         ]
-        return {"unit": self.unit, "axes": self.axes} | {n: getattr(self, n) for n in self.NUMBERS} | {"stages": stages}
+        numbers = {n: getattr(self, n) for n in self.NUMBERS}
+        return {"unit": self.unit, "axes": self.axes} | numbers | {"stages": stages, "curve": self.curve.content}
 
     @classmethod
     def of(cls, fields: Fields) -> "PressModel":
@@ -323,7 +349,7 @@ class PressModel(Known):
         for part in fields.parts("stages", STAGES * DIRECTIONS_MOST):
             direction = part.number("direction_deg", -360.0, 360.0) if part.has("direction_deg") else None
             stages.setdefault(direction, []).append(Stage.of(part, axes))
-        return cls(fields.text("unit", *UNITS.values()), axes, numbers, stages)
+        return cls(fields.text("unit", *UNITS.values()), axes, numbers, stages, CurveModel.of(fields.part("curve")))
 
 
 def _plain(value):
