@@ -68,7 +68,7 @@ ON_FILES = {
     "whisker scene from thymio recordings/random_1 --out scenes/random_1": f"scenes/random_1: from {LOG}, {LOG_ROWS - 1} rows",
 }
 WITH_BRIDGE = {
-    "whisker info": "wire_version: ",
+    "whisker info": "wire version ",
     "whisker info --nodes": "lane",
     "whisker calibrate --out calibration --scene scenes/mine": "rest (",
     "whisker doctor": " frames in ",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ...base_table import Topics
 from ...files import UnreadableError, read_toml
+from ...outputs import put, put_aside
 
 FILE = "base_stops.toml"  # beside robot.toml
 SIGNED, SEEN, COMMAND = "signed_by", "stands_after_s", "command"
@@ -31,14 +32,24 @@ def _is_trusted(content: dict, topics: Topics) -> bool:
 
 
 def note(scene: Path, topics: Topics, stands_after_s: float) -> Path:
-    """Write what was seen."""
+    """Write what was seen; what a person wrote there is kept beside it."""
     path, seen = scene / FILE, time.strftime("%Y-%m-%d %H:%M")
     lines = ["# Written by `whisker base --trial`: after one order to drive the wheels stood by themselves."]
     lines += [f'seen = "{seen}"', f"{SEEN} = {stands_after_s:.2f}", f'{COMMAND} = "{topics.command}"']
-    path.write_text("\n".join(lines) + "\n")
+    if path.exists() and not _is_own(path):
+        put_aside(path)
+    put(path, "\n".join(lines) + "\n")
     return path
+
+
+def _is_own(path: Path) -> bool:
+    try:
+        _, content = read_toml(path)
+    except UnreadableError:
+        return False
+    return SEEN in content and SIGNED not in content
 
 
 def sign(scene: Path, name: str) -> None:
     """Somebody answers for it."""
-    (scene / FILE).write_text(f'{SIGNED} = "{name}"\n')
+    put(scene / FILE, f'{SIGNED} = "{name}"\n')

@@ -20,7 +20,9 @@ from rosbasekit import (
     wait_for,
 )
 
+from crunchbot.base_table import Topics
 from crunchbot.pilot.base import BUMP_LEFT, CLIFF_LEFT, IDLE, Base, BaseError, BaseLost
+from crunchbot.robot.rosbase.signing import FILE, note, why_untrusted
 
 DRIVE = (0.2, 0.0)
 TOUCH = '[base.ros2.touch]\nbump_left = "/bumper"\ncliff_left = "/cliff"\n'
@@ -275,3 +277,11 @@ def test_one_commands_and_all_may_stop(made):
         assert other.stop().v_m_s == 0.0
         base.await_order(STILL, 1)
         assert client.health()["commander"] == "1"
+
+
+def test_a_trial_keeps_what_a_person_signed(tmp_path):
+    (tmp_path / FILE).write_text('# tried on the bench\nsigned_by = "A. Person"\n')
+    note(tmp_path, Topics(), 0.5)
+    note(tmp_path, Topics(), 0.6)
+    assert [path.read_text().startswith("# tried") for path in tmp_path.iterdir() if path.name != FILE] == [True]
+    assert why_untrusted(tmp_path, Topics()) == "" and "0.60" in (tmp_path / FILE).read_text()
