@@ -101,8 +101,9 @@ static void a_base_that_was_not_heard_for_a_while_may_have_been_carried(void **s
         base_robot_watch(&robot, silent_ms + encoders * (BASE_SILENCE_MS + 3 * FRAME_MS));
         report(CREATE_OI_MODE_PASSIVE, 0, 0, robot.opened_ms + FRAME_MS);
         assert_int_equal(carried, !encoders);
+        assert_true(robot.frame.unheard);
         report_frame(0, 0, robot.opened_ms + 2 * FRAME_MS);
-        assert_false(carried);
+        assert_false(carried || robot.frame.unheard);
     }
 }
 
@@ -263,8 +264,57 @@ static void an_order_that_the_base_does_not_repeat_is_written_again(void **state
     base_robot_watch(&robot, now_ms);
     assert_true(was_asked_for(CREATE_OI_OP_DRIVE_DIRECT));
     assert_int_equal(orders[0], 0); /* behind zero bytes: half of it may be there */
-    report_frame(200, 3, now_ms += FRAME_MS);
+    base_robot_watch(&robot, now_ms += FRAME_MS);
+    report_frame(200, 3, now_ms);
     assert_non_null(strstr(health(now_ms), " orders=heard "));
+}
+
+/* An opcode that was altered on the way may have the base take all that follows for a song. */
+static void a_stop_that_is_not_heard_is_written_behind_the_longest_command(void **state)
+{
+    (void)state;
+    static const uint8_t zeros[CREATE_COMMAND_MOST], stop[] = {CREATE_OI_OP_DRIVE_DIRECT, 0, 0, 0, 0};
+    int64_t now_ms = OPENED_MS;
+    say(commander, "drive 0.2 0", now_ms += FRAME_MS);
+    report_frame(200, 3, now_ms += FRAME_MS);
+    say(commander, "stop", now_ms);
+    for (int i = 0; i < 6; i++) {
+        report_frame(200, 3, now_ms += FRAME_MS);
+    }
+    assert_true(was_asked_for(CREATE_OI_OP_DRIVE_DIRECT));
+    assert_true(order_count >= sizeof zeros + sizeof stop);
+    const uint8_t *last = orders + order_count - sizeof stop;
+    assert_memory_equal(last, stop, sizeof stop);
+    assert_memory_equal(last - sizeof zeros, zeros, sizeof zeros);
+    const uint8_t *first = memchr(orders, CREATE_OI_OP_DRIVE_DIRECT, order_count);
+    assert_true(first < last - sizeof zeros); /* and at once, for a base that lacks less */
+}
+
+/* Whatever is ordered meanwhile. */
+static void a_base_that_says_the_same_whatever_is_ordered_is_not_heard(void **state)
+{
+    (void)state;
+    int64_t now_ms = OPENED_MS;
+    for (int i = 0; i < 7; i++) {
+        base_robot_drive(&robot, 0.2 + 0.01 * i, 0, now_ms += FRAME_MS);
+        was_asked_for(CREATE_OI_OP_DRIVE_DIRECT);
+        report(CREATE_OI_MODE_SAFE, 200, 3, now_ms);
+    }
+    assert_true(was_asked_for(CREATE_OI_OP_DRIVE_DIRECT));
+    assert_true(order_count > CREATE_COMMAND_MOST);
+}
+
+/* Lost bytes may have left half an order, for the next one to complete. */
+static void an_order_after_a_pause_begins_with_zero_bytes(void **state)
+{
+    (void)state;
+    for (int late = 0; late < 2; late++) {
+        const int64_t now_ms = robot.written_ms + BASE_SILENCE_MS - 1 + late;
+        was_asked_for(CREATE_OI_OP_DRIVE_DIRECT);
+        base_robot_stop(&robot, now_ms);
+        assert_true(was_asked_for(CREATE_OI_OP_DRIVE_DIRECT));
+        assert_int_equal(orders[0], late ? 0 : CREATE_OI_OP_DRIVE_DIRECT);
+    }
 }
 
 /* A hundred orders in a millisecond: the line carries one a frame, and a stop at once. */
@@ -369,6 +419,24 @@ static void frames_that_come_late_are_not_counted_twice(void **state)
     assert_true(fabs(motion.x - 0.042) < 1e-6);
 }
 
+/* An adapter holds what was said for 400 ms: seven frames came of it, so the base has said nothing since. */
+static void what_the_line_has_held_is_old(void **state)
+{
+    (void)state;
+    uint8_t frames[7 * CREATE_STREAM_BYTES];
+    size_t count = 0;
+    base_robot_read(&robot, UINT64_MAX, OPENED_MS + 399);
+    for (int i = 0; i < 7; i++) {
+        count += make_frame(CREATE_OI_MODE_SAFE, 0, 0, frames + count);
+    }
+    assert_int_equal(send(line, frames, count, 0), count);
+    assert_true(base_robot_read(&robot, UINT64_MAX, OPENED_MS + 400));
+    base_robot_watch(&robot, OPENED_MS + 7 * FRAME_MS + BASE_SILENCE_MS - 1);
+    assert_true(base_robot_heard(&robot));
+    base_robot_watch(&robot, OPENED_MS + 7 * FRAME_MS + BASE_SILENCE_MS);
+    assert_false(base_robot_heard(&robot));
+}
+
 #define UNHEARD(test) cmocka_unit_test_setup_teardown(test, begin_unheard, end)
 #define HEARD(test) cmocka_unit_test_setup_teardown(test, begin, end)
 
@@ -387,9 +455,13 @@ int main(void)
         HEARD(a_mode_ends_with_who_asked_for_it),
         HEARD(a_base_that_was_let_go_rests_until_somebody_commands),
         HEARD(an_order_that_the_base_does_not_repeat_is_written_again),
+        HEARD(an_order_after_a_pause_begins_with_zero_bytes),
+        HEARD(a_stop_that_is_not_heard_is_written_behind_the_longest_command),
+        HEARD(a_base_that_says_the_same_whatever_is_ordered_is_not_heard),
         HEARD(orders_without_a_pause_leave_the_line_free_for_a_stop),
         HEARD(a_stop_is_tried_until_it_is_written),
         HEARD(the_clock_says_how_long_a_gap_is),
+        HEARD(what_the_line_has_held_is_old),
         HEARD(frames_that_come_late_are_not_counted_twice),
     };
     return cmocka_run_group_tests_name("base belief", tests, NULL, NULL);

@@ -39,7 +39,7 @@ enum {
     BASE_CLIFF_FRONT_RIGHT = 1 << 7,
     BASE_CLIFF_RIGHT = 1 << 8,
     BASE_IDLE = 1 << 9,    /* wheels will not turn: the base is not in its mode, not heard, not connected, or held */
-    BASE_CARRIED = 1 << 10 /* both wheels hang, it was not heard and does not count, or what it says no wheel does */
+    BASE_CARRIED = 1 << 10 /* both wheels hang, not heard and perhaps not counted, or it says what no wheel does */
 };
 
 /* How far the base is with the mode it is asked for. From every mode the way leads through passive, where nothing can
@@ -83,7 +83,8 @@ struct base_robot {
     uint8_t cut[CREATE_COMMAND_BYTES]; /* the rest of an order for which there was no room */
     size_t cut_count;
     int64_t written_ms, opcode_ms;
-    uint32_t unheard; /* frames that say other speeds than were written */
+    uint32_t unheard;                /* frames that say the same speeds as before, and not those that were written */
+    int32_t asked_left, asked_right; /* of the newest frame */
 
     unsigned requests;         /* for frames, so far */
     unsigned unheard_requests; /* since the newest frame */
@@ -100,6 +101,7 @@ struct base_robot {
     unsigned held;          /* bits of enum base_hold: while one is set the wheels stay stopped */
     int64_t drive_ms, opened_ms;
     int64_t frame_ms;    /* when the newest frame was said, at the latest: what has waited to be read is older */
+    int64_t heard_ms;    /* when it was said, at the earliest */
     int64_t emptied_ms;  /* when nothing was left to read */
     double schedule_ms;  /* when it was due, by those that came soonest */
     uint32_t pending;    /* frames that count as missed by the clock alone: they may come late */

@@ -140,7 +140,6 @@ static void orders_flush_wheels(struct base_robot *robot, int64_t now_ms)
     if (robot->speeds.left_mm_s != robot->written.left_mm_s || robot->speeds.right_mm_s != robot->written.right_mm_s) {
         orders_account(robot, now_ms);
         robot->ordered.changed = true;
-        robot->unheard = 0;
     }
     robot->written = robot->speeds;
     robot->written_ms = now_ms;
@@ -166,9 +165,25 @@ void base_orders_flush(struct base_robot *robot, int64_t now_ms)
 
 void base_orders_wheels(struct base_robot *robot, struct create_speeds speeds, int64_t now_ms)
 {
+    /* One that is behind a pause does not complete what bytes that were lost have left half. */
+    robot->firm |= !robot->options->stream_clock && now_ms - robot->written_ms >= BASE_SILENCE_MS;
     robot->due = robot->port >= 0;
     robot->speeds = robot->due ? speeds : (struct create_speeds){0};
     base_orders_flush(robot, now_ms);
+}
+
+void base_orders_again(struct base_robot *robot, int64_t now_ms)
+{
+    static const uint8_t zeros[CREATE_COMMAND_MOST];
+    const struct create_speeds speeds = robot->speeds, stop = {0};
+    robot->firm = robot->may_turn = true;
+    base_orders_wheels(robot, stop, now_ms);
+    if (robot->cut_count == 0) {
+        orders_put(robot, zeros, sizeof zeros);
+    }
+    robot->may_turn = true;
+    base_orders_wheels(robot, stop, now_ms);
+    base_orders_wheels(robot, speeds, now_ms);
 }
 
 void base_orders_opcode(struct base_robot *robot, enum create_oi_opcode opcode, int64_t now_ms)

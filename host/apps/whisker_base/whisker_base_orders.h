@@ -17,6 +17,10 @@ void base_orders_lose(struct base_robot *robot, const char *doing);
 void base_orders_wheels(struct base_robot *robot, struct create_speeds speeds, int64_t now_ms);
 void base_orders_opcode(struct base_robot *robot, enum create_oi_opcode opcode, int64_t now_ms);
 
+/* Stops the wheels, at once and again behind enough zero bytes to end whatever the base takes for a command, and then
+ * orders the speeds anew: an opcode that was altered may have it swallow what follows. */
+void base_orders_again(struct base_robot *robot, int64_t now_ms);
+
 /* An opcode that waits is no longer wanted. */
 void base_orders_drop_opcode(struct base_robot *robot);
 

@@ -116,7 +116,17 @@ static void whisker_base_robot_stop_commander(struct base_robot *robot, int64_t 
 /* Since when the base is silent: the newest frame that it was asked for, or when it was asked. */
 static int64_t whisker_base_robot_heard_ms(const struct base_robot *robot)
 {
-    return robot->answered && robot->frame_ms > robot->opened_ms ? robot->frame_ms : robot->opened_ms;
+    return robot->answered && robot->heard_ms > robot->opened_ms ? robot->heard_ms : robot->opened_ms;
+}
+
+/* So many frames at once, and too few for the time since the one before: the line may have held them, and the base have
+ * said nothing since. */
+static void whisker_base_robot_note_heard(struct base_robot *robot, int64_t before_ms, int64_t frames)
+{
+    const int64_t least_ms = before_ms + frames * CREATE_OI_PERIOD_MS;
+    if (frames > 0) {
+        robot->heard_ms = robot->frame_ms - least_ms > LATE_MS ? least_ms : robot->frame_ms;
+    }
 }
 
 static bool whisker_base_robot_moving(const struct base_robot *robot)
@@ -170,8 +180,8 @@ static void whisker_base_robot_log_carried(struct base_robot *robot)
 {
     base_log(
         &robot->log.carried, LOG_WARN,
-        "%s: the base says what its wheels cannot have done: it was carried or pushed, or the line is bad; taken for "
-        "what was asked of it",
+        "%s: the base says what its wheels cannot have done: it was carried, pushed or started anew, or the line is "
+        "bad; taken for what was asked of it",
         robot->options->port);
 }
 
@@ -180,6 +190,7 @@ static void whisker_base_robot_step(struct base_robot *robot)
 {
     const uint64_t carried = robot->odometry.carried;
     const bool counted = robot->odometry.started; /* by encoders, also while nobody heard it */
+    robot->frame.unheard = robot->unseen;
     const struct create_step step = create_odometry_take(&robot->odometry, &robot->frame);
     const bool more = robot->odometry.carried > carried;
     const unsigned bits = base_robot_bits(robot), lifted = CREATE_OI_DROP_LEFT | CREATE_OI_DROP_RIGHT;
@@ -229,6 +240,8 @@ static void whisker_base_robot_look_at(struct base_robot *robot, uint8_t byte)
 bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
 {
     uint8_t bytes[READ_BYTES];
+    const int64_t before_ms = robot->frame_ms;
+    int64_t frames = 0;
     for (int reads = 0; reads < READS && robot->port >= 0; reads++) {
         const uint64_t left = limit - base_robot_taken(robot);
         const size_t room = left < sizeof bytes ? (size_t)left : sizeof bytes;
@@ -244,12 +257,14 @@ bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
             if (asked || (!robot->answered && robot->before.length > 0 &&
                           create_stream_push(&robot->before, bytes[i], &robot->frame))) {
                 whisker_base_robot_take_frame(robot, now_ms);
+                frames++;
             }
         }
         if ((size_t)got < sizeof bytes) {
             break;
         }
     }
+    whisker_base_robot_note_heard(robot, before_ms, frames);
     robot->emptied_ms = now_ms;
     return robot->port >= 0;
 }

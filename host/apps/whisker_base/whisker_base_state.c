@@ -258,21 +258,24 @@ static void whisker_base_state_watch_mode(struct base_robot *robot, int64_t now_
     }
 }
 
-/* Wheels that may turn are asked for what was ordered: a base that says anything else has not heard it. */
+/* Wheels that may turn are asked for what was ordered, or for one order after the other: a base that says the same all
+ * the time has not heard them. */
 static void whisker_base_state_watch_orders(struct base_robot *robot, int64_t now_ms)
 {
     const int32_t left = robot->frame.value[CREATE_OI_REQUESTED_LEFT],
                   right = robot->frame.value[CREATE_OI_REQUESTED_RIGHT];
     const bool turns = base_robot_mode_reported(robot) >= CREATE_OI_MODE_SAFE;
-    robot->unheard = turns && !base_orders_heard(robot) ? robot->unheard + 1 : 0;
+    const bool same = left == robot->asked_left && right == robot->asked_right;
+    robot->unheard = !turns || base_orders_heard(robot) ? 0 : same ? robot->unheard + 1 : 1;
+    robot->asked_left = left;
+    robot->asked_right = right;
     if (robot->unheard > 0 && robot->unheard % UNHEARD_FRAMES == 0) {
-        robot->firm = robot->may_turn = true;
         base_log(
             &robot->log.orders, LOG_WARN,
             "%s: ordered %d and %d mm/s, the base says %d and %d: ordered again; the wheels may turn; check the wire "
             "to it",
             robot->options->port, robot->written.left_mm_s, robot->written.right_mm_s, left, right);
-        base_orders_wheels(robot, robot->speeds, now_ms);
+        base_orders_again(robot, now_ms);
     }
 }
 

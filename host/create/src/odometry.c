@@ -106,6 +106,18 @@ static int32_t odometry_counted(int32_t now, int32_t before)
     return (int16_t)(uint16_t)(now - before);
 }
 
+/* Whether a base that was not heard may count from 0 again: nobody has driven it since it was started, but it may have
+ * been pushed. */
+static bool odometry_started_anew(const struct create_odometry *odometry, const struct create_frame *frame)
+{
+    const struct create_reach reach = {SPEED_MAX_M_S, odometry->settings.wheel_base_m};
+    const double left = frame->value[CREATE_OI_ENCODER_LEFT], right = frame->value[CREATE_OI_ENCODER_RIGHT];
+    const double count_m = create_model_facts(odometry->settings.model)->count_m;
+    return frame->unheard &&
+           create_judge(&reach, (right + left) / 2 * count_m, (right - left) * count_m / reach.wheel_base_m, 0,
+                        (frame->missed + 1) * PERIOD_S) != CREATE_CARRIED;
+}
+
 /* Motion of both wheels by their encoders, m. False: the frame is the first. */
 static bool odometry_count_wheels(struct create_odometry *odometry, const struct create_frame *frame, double *left,
                                   double *right)
@@ -212,16 +224,18 @@ static struct odometry_units odometry_units(double distance_m, double angle_rad)
     return (struct odometry_units){distance_m / DISTANCE_UNIT_M, angle_rad / ANGLE_UNIT_RAD};
 }
 
-/* Holds what a frame says against what wheels can do in its time. Nothing is left out: it is believed, in doubt, or
- * replaced and counted. */
-static void odometry_bound(struct create_odometry *odometry, struct create_step *step, const struct create_frame *frame)
+/* Holds what a frame says against what wheels can do in its time; anew: it may count from another beginning. Nothing is
+ * left out: it is believed, in doubt, or replaced and counted. */
+static void odometry_bound(struct create_odometry *odometry, struct create_step *step, const struct create_frame *frame,
+                           bool anew)
 {
     const struct create_reach reach = {SPEED_MAX_M_S, odometry->settings.wheel_base_m};
     const double time_s = (frame->missed + 1) * PERIOD_S + HELD_S;
     const double asked_m =
         fmax(create_wheel_way(&reach, odometry->asked_m, odometry->asked_rad),
              create_wheel_way(&reach, odometry_asked_distance(frame), odometry_asked_angle(odometry, frame)));
-    const enum create_verdict verdict = create_judge(&reach, step->distance, step->angle, asked_m / PERIOD_S, time_s);
+    const enum create_verdict verdict =
+        anew ? CREATE_CARRIED : create_judge(&reach, step->distance, step->angle, asked_m / PERIOD_S, time_s);
     if (verdict == CREATE_CARRIED) {
         const double driven_m = create_driven_most(&reach, time_s);
         odometry->carried++;
@@ -248,7 +262,7 @@ static struct create_step odometry_step_by_encoders(struct create_odometry *odom
                                   settings->relative_sigma, 0, count_m * sqrt(2) / settings->wheel_base_m};
     struct create_step step = odometry_step_of(odometry, distance, angle);
     const uint64_t carried = odometry->carried;
-    odometry_bound(odometry, &step, frame);
+    odometry_bound(odometry, &step, frame, odometry_started_anew(odometry, frame));
     if (odometry->carried > carried) {
         odometry_add_estimate(odometry, &step, frame->missed, frame);
     }
@@ -266,7 +280,7 @@ static struct create_step odometry_step_by_values(struct create_odometry *odomet
     odometry->angle = odometry_choose(odometry, asked.angle, reported.angle);
     struct create_step step =
         odometry_step_of(odometry, odometry_read_distance(odometry, frame, d), odometry_read_angle(odometry, frame, a));
-    odometry_bound(odometry, &step, frame);
+    odometry_bound(odometry, &step, frame, false);
     if (frame->timing == CREATE_LATE) { /* here it is, and what it was thought to be worth is taken back */
         step.distance -= odometry->missed_m;
         step.angle -= odometry->missed_rad;

@@ -232,6 +232,25 @@ static void encoders_bridge_missed_frames_and_a_new_beginning_does_not_count(voi
     assert_close(base.motion.x, 91 * 0.000444565, 1e-7);
 }
 
+/* A base that was not heard and counts little: it may have been started anew, and where it drove before nobody knows.
+ */
+static void counts_after_a_silence_are_carried_where_they_may_begin_anew(void **state)
+{
+    (void)state;
+    static const struct {
+        int32_t before, after;
+        bool unheard, carried;
+    } cases[] = {{500, 0, true, true}, {500, 100, true, true}, {500, 0, false, false}, {9000, 9200, true, false}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct base base = base_begin(CREATE_2, CREATE_AUTO, true);
+        struct create_frame frame = {.missed = 100, .unheard = cases[i].unheard};
+        count(&base, cases[i].before, cases[i].before, 0);
+        frame.value[CREATE_OI_ENCODER_LEFT] = frame.value[CREATE_OI_ENCODER_RIGHT] = cases[i].after;
+        base_take(&base, &frame);
+        assert_int_equal(base.odometry.carried, cases[i].carried);
+    }
+}
+
 static void settings_that_cannot_be_are_refused(void **state)
 {
     (void)state;
@@ -264,6 +283,7 @@ int main(void)
         cmocka_unit_test(missed_frames_after_an_order_are_worth_what_the_base_heard_of_it),
         cmocka_unit_test(encoders_wrap),
         cmocka_unit_test(encoders_bridge_missed_frames_and_a_new_beginning_does_not_count),
+        cmocka_unit_test(counts_after_a_silence_are_carried_where_they_may_begin_anew),
         cmocka_unit_test(settings_that_cannot_be_are_refused),
     };
     return cmocka_run_group_tests_name("odometry", tests, NULL, NULL);

@@ -284,13 +284,18 @@ static const char *health_of(const char *key)
     return found;
 }
 
-/* No stop can come through, or nobody is there to write one. A base whose line has another speed, by an order that was
- * spoilt, hears nothing any more. */
+/* A base whose line has another speed, by an order that was spoilt, hears no order any more. The emulator still gives
+ * it bytes, later and cut anywhere: no line does. */
+static bool deafened(void)
+{
+    return sim_create_baud(create) != create_model_facts(options.odometry.model)->baud;
+}
+
+/* No stop can come through, or nobody is there to write one. */
 static bool excused(void)
 {
-    return sim_create_baud(create) != create_model_facts(options.odometry.model)->baud ||
-           now_ms <= to_robot_ms + BASE_SILENCE_MS + MARGIN_MS || now_ms <= driver_ms + MARGIN_MS || !plugged ||
-           now_ms <= opened_ms + MARGIN_MS + 40;
+    return deafened() || now_ms <= to_robot_ms + BASE_SILENCE_MS + MARGIN_MS || now_ms <= driver_ms + MARGIN_MS ||
+           !plugged || now_ms <= opened_ms + MARGIN_MS + 40;
 }
 
 static void judge_stops(void)
@@ -362,7 +367,7 @@ static void judge_speeds(void)
     stray_ms = known ? now_ms : stray_ms;
     if (!known && !excused() && now_ms - stray_ms > AGREE_MS) {
         blame("wheels at %.0f %.0f mm/s, which nobody has ordered", left_mm_s, right_mm_s);
-    } else if (!known && now_ms > to_robot_ms + BELIEVED_MS && plugged) {
+    } else if (!known && now_ms > to_robot_ms + BELIEVED_MS && plugged && !deafened()) {
         blame("wheels at %.0f %.0f mm/s for a moment, which nobody has ordered", left_mm_s, right_mm_s);
     }
 }
@@ -371,7 +376,7 @@ static int leg_ms(void);
 
 static void judge_recovery(void)
 {
-    if (now_ms < RECOVER_MS + BEGIN_MS || sim_create_baud(create) != create_model_facts(options.odometry.model)->baud) {
+    if (now_ms < RECOVER_MS + BEGIN_MS || deafened()) {
         return;
     }
     if (base_robot_kept(&robot)) {

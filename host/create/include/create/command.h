@@ -18,6 +18,8 @@ extern "C" {
 #pragma GCC visibility push(default)
 
 #define CREATE_COMMAND_BYTES 64
+/* More bytes than any command lacks, if its opcode was altered on the way: a song's are the most, opcode 140. */
+#define CREATE_COMMAND_MOST (3 + 2 * 255)
 
 /* Wheel speeds in whole mm/s as in the order, and the motion that follows: really driven, not asked for. */
 struct create_speeds {

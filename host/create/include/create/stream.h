@@ -43,6 +43,7 @@ struct create_frame {
     uint32_t missed; /* frames that should have come since the one before, judged by the bytes skipped; a caller that
                         has a clock judges anew */
     struct create_ordered ordered; /* since the frame before; a caller that orders speeds sets it */
+    bool unheard; /* the base was not heard for so long before that it may have been started anew; a caller sets it */
 };
 
 struct create_stream_counts {
