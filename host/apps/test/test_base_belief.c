@@ -229,6 +229,18 @@ static void a_mode_ends_with_who_asked_for_it(void **state)
     assert_true(base_robot_kept(&robot));
 }
 
+/* One frame that lied said passive as other firmwares count: what follows does not fit, and is not believed. */
+static void a_mode_above_the_one_asked_for_is_not_believed(void **state)
+{
+    (void)state;
+    int64_t now_ms = OPENED_MS;
+    report(CREATE_OI_MODE_PASSIVE, 0, 0, now_ms += FRAME_MS);
+    assert_int_equal(robot.phase, BASE_ENTERING);
+    report(CREATE_OI_MODE_FULL, 0, 0, now_ms += 100);
+    assert_int_equal(robot.phase, BASE_RESTING);
+    assert_non_null(strstr(health(now_ms), " mode=unknown "));
+}
+
 /* Lets go, and is gone: it rests until somebody takes the command. */
 static void a_base_that_was_let_go_rests_until_somebody_commands(void **state)
 {
@@ -453,6 +465,7 @@ int main(void)
         UNHEARD(a_mode_is_asked_for_until_the_base_says_it),
         HEARD(a_base_that_did_not_hear_of_a_lower_mode_does_not_drive),
         HEARD(a_mode_ends_with_who_asked_for_it),
+        UNHEARD(a_mode_above_the_one_asked_for_is_not_believed),
         HEARD(a_base_that_was_let_go_rests_until_somebody_commands),
         HEARD(an_order_that_the_base_does_not_repeat_is_written_again),
         HEARD(an_order_after_a_pause_begins_with_zero_bytes),

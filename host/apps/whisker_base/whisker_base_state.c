@@ -7,7 +7,7 @@
 /* A base is in the mode it was asked for long before so many frames: before, it is asked for again every few. */
 #define MODE_FRAMES 20
 #define ASK_FRAMES 5
-/* It does not enter its mode within 1 s: a person is informed, and it begins anew. */
+/* It does not enter its mode within 1 s, or says a higher one: a person is informed, and it begins anew. */
 #define ENTER_FRAMES (1000 / CREATE_OI_PERIOD_MS)
 /* An order shows in the frames after 60 ms at the latest: period, line, adapter, and the pace of a lock-step
  * simulation. Frames that say other speeds for longer: it was not heard, or not whole. */
@@ -218,8 +218,8 @@ static void whisker_base_state_rest(struct base_robot *robot, int64_t now_ms)
 
 static void whisker_base_state_enter(struct base_robot *robot, int64_t now_ms)
 {
-    if (robot->phase_frames >= ENTER_FRAMES) {
-        base_log(&robot->log.mode, LOG_WARN, "%s: asked for %s mode for 1 s, the base does not enter it: %s",
+    if (base_robot_mode_reported(robot) > (int32_t)robot->wanted || robot->phase_frames >= ENTER_FRAMES) {
+        base_log(&robot->log.mode, LOG_WARN, "%s: asked for %s mode, the base does not enter it: %s",
                  robot->options->port, whisker_base_state_mode_name(robot->wanted),
                  whisker_base_state_mode_reason(robot));
         whisker_base_state_begin_phase(robot, BASE_RESTING, now_ms);
