@@ -185,7 +185,7 @@ def test_texture_learns_and_reports(capsys, tmp_path):
     code, out, _ = run(capsys, "texture", "classify", model, recording, "--json")
     decisions = [json.loads(line) for line in out.splitlines()]
     assert code == 0 and len(decisions) == 10
-    assert set(decisions[0]) == {"t_s", "loglik", "label", "best", "confidence", "border"}
+    assert set(decisions[0]) == {"t_s", "loglik", "label", "best", "confidence"}
     assert set(decisions[0]["loglik"]) == {"calm", "rough"} and {d["label"] for d in decisions} == {"rough"}
     assert run(capsys, "texture", "classify", model, recording, "--window-ms", "0")[0] == 2
     recording.write_text("t_s,x\n0,1\n")
