@@ -37,9 +37,13 @@ class BaseTable:
     def turn_most_rad_s(self) -> float:
         return 2.0 * self.wheel_most_m_s / self.wheel_base_m
 
+    def wheel_m_s(self, v_m_s: float, omega_rad_s: float) -> float:
+        """Speed of the faster wheel."""
+        return abs(v_m_s) + abs(omega_rad_s) * self.wheel_base_m / 2.0
+
     def reached(self, v_m_s: float, omega_rad_s: float) -> tuple[float, float]:
         """Speeds on the same curve that no wheel is too slow for."""
-        wheel_m_s = abs(v_m_s) + abs(omega_rad_s) * self.wheel_base_m / 2.0
+        wheel_m_s = self.wheel_m_s(v_m_s, omega_rad_s)
         share = min(1.0, self.wheel_most_m_s / wheel_m_s) if wheel_m_s else 1.0
         return share * v_m_s, share * omega_rad_s
 

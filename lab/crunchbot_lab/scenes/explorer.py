@@ -12,15 +12,13 @@ import numpy as np
 
 from crunchbot.pilot.behaviour import (
     BLOCK_TICKS,
-    EXPLORE_M_S,
     ODOMETRY_TICKS,
-    PUSH_TICKS,
     TICK_S,
-    TURN_RAD_S,
     Behaviour,
 )
 from crunchbot.pilot.choices import Choices
 from crunchbot.pilot.states import PLAIN, Habits
+from crunchbot.pilot.wheels import Wheels
 from crunchbot.scene import Arena, Robot
 from crunchbot.touch.mount import Mount
 
@@ -82,7 +80,8 @@ class Explorer:
         self.mounts = {n: Mount.of(whisker) for n, whisker in enumerate(self.rays)}
         turns = {n: mount.corner_turn for n, mount in self.mounts.items()}
         sides = {n: -mount.face_turn for n, mount in self.mounts.items()}
-        self.behaviour = Behaviour(self.feelers, turns, rng, sides, habits=habits, choices=choices)
+        wheels = Wheels.without_driver(robot.base)
+        self.behaviour = Behaviour(self.feelers, turns, rng, sides, wheels, habits, choices)
         self.waiting = [(0.0, 0.0)] * (1 + DELAY_BLOCKS)
         self.tick = 0
         self.measured: dict[int, float] = {}
@@ -132,7 +131,10 @@ class Explorer:
         if whisk is None or whisk.start < 0 or whisk.measured:
             return
         feeler = self.feelers[whisk.lane]
-        if whisk.start < feeler.onset <= whisk.push_end - PUSH_TICKS and feeler.release > feeler.onset:
+        if (
+            whisk.start < feeler.onset <= whisk.push_end - self.behaviour.wheels.push_ticks
+            and feeler.release > feeler.onset
+        ):
             whisk.measured = True
             line_mm = 1000.0 * (feeler.range_m if feeler.range_m < feeler.length_m - TIP_M else feeler.length_m)
             reported = self.mounts[whisk.lane].distance(line_mm, whisk.direction)
@@ -150,8 +152,7 @@ class Explorer:
     def sweeping(self, was_whisking: bool) -> bool:
         v, omega = self.behaviour.drive
         steady = self.behaviour.drive_since + SETTLE_TICKS <= self.tick
-        moving = v == EXPLORE_M_S or abs(omega) == TURN_RAD_S
-        return steady and moving and not self.behaviour.whisking and not was_whisking
+        return steady and self.behaviour.wheels.sweeps(v, omega) and not self.behaviour.whisking and not was_whisking
 
 
 def explore(arena: Arena, robot: Robot, start: Sequence[float], rows: int, rng: np.random.Generator) -> Explored:

@@ -9,8 +9,9 @@ from crunchbot.nav.mapper import Mapper, TouchMap
 from crunchbot.nav.observations import Observations
 from crunchbot.pilot.choices import Choices
 from crunchbot.pilot.states import FULL
+from crunchbot.pilot.wheels import EXACT
 from crunchbot.planning.mapping import NO_WHISKERS, Mapping
-from crunchbot.robot.policy import VEHICLE
+from crunchbot.robot.policy import vehicle_of
 from crunchbot.scene import Arena
 from crunchbot_lab.scenes import walk
 from crunchbot_lab.scenes.explorer import Explorer
@@ -77,7 +78,7 @@ class MapLoop:
 
 
 def mapping(loop: MapLoop, random: Choices) -> Mapping:
-    return Mapping(loop.robot, VEHICLE, loop.pose, loop.known, random)
+    return Mapping(loop.robot, vehicle_of(EXACT), loop.pose, loop.known, random)
 
 
 def as_it_is(loop: MapLoop, random: Choices) -> Choices:

@@ -11,13 +11,14 @@ from types import SimpleNamespace
 from whisker_protocol import LANES
 
 from ..arguments import RING, add_output, add_ring_owner, whole_number
+from ..base_table import BaseTable
 from ..bridge.nodes import NodeError
 from ..bridge.ring import Reader
 from ..errors import UserError
 from ..outputs import opened, put
 from ..pilot.base import Base
 from ..pilot.pilot import Pilot
-from ..pilot.wheels import EXACT, Wheels
+from ..pilot.wheels import Wheels
 from ..robot.blocks import LiveRing
 from ..robot.models import check_nodes, load_models
 from ..robot.network.health import Health
@@ -102,7 +103,7 @@ def _body(arguments) -> tuple:
 def _parts(arguments, body: tuple, link: Link, wheels: Wheels, stack: ExitStack) -> SimpleNamespace:
     scene, texture, radial = body
     pilot = Pilot(scene.robot, texture, radial, arguments.seed, wheels)
-    made = choices_of(arguments.choose, scene.robot, pilot.behaviour.choices)
+    made = choices_of(arguments.choose, scene.robot, wheels, pilot.behaviour.choices)
     pilot.behaviour.choices, taker = made
     out, traces = (stack.enter_context(opened(path, arguments.overwrite)) for path in (arguments.out, arguments.traces))
     parts = {"rows": Rows(out), "traces": Traces(traces, pilot), "publisher": Publisher(link, pilot, taker)}
@@ -114,7 +115,9 @@ def _fly_in_step(arguments, stack: ExitStack) -> SimpleNamespace:
     body = _body(arguments)
     link = stack.enter_context(open_link("pilot", arguments))
     base = stack.enter_context(Base(arguments.base)) if arguments.base else None
-    parts = _parts(arguments, body, link, wheels_of(base.health()) if base else EXACT, stack)
+    table = body[0].robot.base
+    able = wheels_of(base.health(), table) if base else Wheels.without_driver(table)
+    parts = _parts(arguments, body, link, able, stack)
     link.announce()
     if not link.wait_for(arguments.others, OTHERS_WAIT_S):
         gone = ", ".join(sorted(set(arguments.others) - link.peers))
@@ -132,7 +135,7 @@ def _fly_live(arguments, stack: ExitStack) -> SimpleNamespace:
     stop, heartbeat, body = stop_on_signals(), Heartbeat.of_environment(), _body(arguments)
     link = stack.enter_context(open_link("pilot", arguments))
     base = LiveBase(arguments.base)
-    parts = _parts(arguments, body, link, _known_wheels(base, link, stop), stack)
+    parts = _parts(arguments, body, link, _known_wheels(base, body[0].robot.base, link, stop), stack)
     wheels = LiveWheels(base)
     ring = stack.enter_context(closing(LiveRing(arguments.ring, len(parts.pilot.names), owner=arguments.ring_owner)))
     parts.flight = Flight(parts.pilot, wheels, parts.rows, parts.traces, parts.publisher)
@@ -152,12 +155,12 @@ def _greet(others: list[str], link: Link, stop: threading.Event) -> None:
         continue
 
 
-def _known_wheels(base: LiveBase, link: Link, stop: threading.Event) -> Wheels:
+def _known_wheels(base: LiveBase, table: BaseTable, link: Link, stop: threading.Event) -> Wheels:
     """Waits for the base to say what it can do; meanwhile the pilot's health says so."""
     health = Health(link, dict)
     while not (reported := base.health()) and not stop.wait(RETRY_S):
         health.report(0, base.trouble, base.trouble)
-    return wheels_of(reported) if reported else EXACT
+    return wheels_of(reported, table) if reported else Wheels.of(table)
 
 
 def _write_report(path: Path, parts: SimpleNamespace) -> None:

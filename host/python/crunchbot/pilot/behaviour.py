@@ -24,6 +24,7 @@ from .states import (
     ODOMETRY_TICKS,
     PUSH_TICKS,
     SEARCH_RAD,
+    SLOW,
     STUCK_SHARE,
     TICK_S,
     TURN_RAD_S,
@@ -83,7 +84,7 @@ class Behaviour:
         self.choices = choices or Random(rng)
         self.state = State.SETTLE
         self.drive = (0.0, 0.0)
-        self.drive_since = 0  # first tick at which the present drive is in effect
+        self.drive_since = 0  # first tick at which the wheels have the present drive's speeds
         self.whisk: Whisk | None = None
         self.since, self.done, self.goal, self.sign, self.stuck = 0, 0.0, 0.0, 1.0, 0
         self.reason = "start"  # why the state before was left
@@ -104,8 +105,8 @@ class Behaviour:
             self._take(rule, tick)
         drive = SPEEDS[self.state](self)
         if drive != self.drive:
+            self.drive_since = tick + self.wheels.steady_ticks(self.drive, drive)
             self.drive = drive
-            self.drive_since = tick + self.wheels.effect_ticks
             self.stuck = 0
         return drive
 
@@ -124,7 +125,7 @@ class Behaviour:
         self.heard, self.bumps = tick, bumps
         self.whereabouts.moved(tick, dx, dy, dtheta)
         v, omega = self.drive
-        if tick - ODOMETRY_TICKS < self.drive_since or abs(v) + abs(omega) < 0.06:
+        if tick - ODOMETRY_TICKS < self.drive_since or self.state in SLOW or not any(self.drive):
             return
         period = ODOMETRY_TICKS * TICK_S
         blocked = (

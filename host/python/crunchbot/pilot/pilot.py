@@ -27,7 +27,7 @@ from ..touch.floor import WINDOW_LEAST_GOOD, WINDOW_SAMPLES, floor_whisker
 from ..touch.mount import Mount
 from ..touch.radial.model import Contact as Recorded
 from ..touch.radial.model import WhiskModel, estimate, peak
-from .behaviour import BLOCK_TICKS, EXPLORE_M_S, TICK_S, TURN_RAD_S, Behaviour, Habits, Whisk
+from .behaviour import BLOCK_TICKS, TICK_S, Behaviour, Habits, Whisk
 from .feel import SURE, Drives, Feeler, Felt
 from .states import FULL
 from .tip import contact_type, move_for_tip
@@ -251,7 +251,7 @@ class Pilot:
         """Whether the tips moved over the floor at the speed they were trained at during the whole window."""
         v, omega = self.behaviour.drive
         steady = self.behaviour.drive_since + SETTLE_TICKS <= tick + 1 - WINDOW_SAMPLES
-        return steady and (v == EXPLORE_M_S or abs(omega) == TURN_RAD_S)
+        return steady and self.behaviour.wheels.sweeps(v, omega)
 
     def _felt(self, lane: int, tick: int, released: dict) -> Felt | None:
         """What a whisker touches, or has just let go, from where the robot is at `tick`."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from . import conditions as when
 from . import effects as then
-from .states import EXPLORE_M_S, TURN_RAD_S, State
+from .states import State
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ STILL = (0.0, 0.0)
 # Metres and radians per second: forward, anticlockwise.
 SPEEDS = {
     S.SETTLE: lambda b: STILL,
-    S.FORWARD: lambda b: (EXPLORE_M_S, 0.0),
-    S.TURN: lambda b: (0.0, b.sign * TURN_RAD_S),
+    S.FORWARD: lambda b: (b.wheels.explore_m_s, 0.0),
+    S.TURN: lambda b: (0.0, b.sign * b.wheels.turn_rad_s),
     S.WAIT: lambda b: STILL,
     S.BACK_OFF: lambda b: (-b.wheels.back_off_m_s, 0.0),
     S.WHISK_IN: lambda b: (0.0, b.wheels.whisk_rad_s * b.whisk.direction),
@@ -78,9 +78,9 @@ SPEEDS = {
     S.WHISK_OUT: lambda b: (0.0, -b.wheels.whisk_rad_s * b.whisk.direction),
     S.HOLD: lambda b: STILL,
     S.RETREAT: lambda b: (-b.wheels.back_off_m_s, 0.0),
-    S.CLEAR: lambda b: (-EXPLORE_M_S, 0.0),
-    S.ESCAPE: lambda b: (-EXPLORE_M_S, 0.0),
-    S.TURN_AWAY: lambda b: (0.0, b.sign * TURN_RAD_S),
+    S.CLEAR: lambda b: (-b.wheels.explore_m_s, 0.0),
+    S.ESCAPE: lambda b: (-b.wheels.explore_m_s, 0.0),
+    S.TURN_AWAY: lambda b: (0.0, b.sign * b.wheels.turn_rad_s),
     S.HALT: lambda b: STILL,
     S.STOPPED: lambda b: STILL,
 }

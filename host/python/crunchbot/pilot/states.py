@@ -9,6 +9,7 @@ BLOCK_TICKS = 40
 EFFECT_TICKS = 41  # an answer to the block ending at tick T moves the wheels from tick T + 41 on
 ODOMETRY_TICKS = 200
 
+# What a pilot wants; a base that cannot is slower (wheels.Wheels).
 EXPLORE_M_S = 0.15
 TURN_RAD_S = 0.71  # the texture tips, 0.21 m from the centre, then sweep the floor as fast as when driving straight
 WHISK_RAD_S = math.pi / 24  # the paper's body whisk
@@ -58,6 +59,8 @@ class State(Enum):
 
 
 WHISKING = {State.BACK_OFF, State.WHISK_IN, State.PUSH, State.WHISK_OUT, State.HOLD, State.RETREAT}
+
+SLOW = {State.BACK_OFF, State.RETREAT}  # so slow that reports of 0.1 s do not tell whether something blocks
 
 
 @dataclass(frozen=True)

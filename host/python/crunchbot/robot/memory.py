@@ -14,7 +14,7 @@ from ..nav import filters
 from ..nav.filters import COMPONENT
 from ..occupancy import from_map
 from ..outputs import put_aside
-from ..pilot.states import EXPLORE_M_S, TURN_RAD_S
+from ..pilot.wheels import Wheels
 from ..scene import Scene
 from . import checkpoint
 from .checkpoint import Checkpoint, CheckpointError
@@ -47,7 +47,9 @@ class Memory:
         except CheckpointError as error:
             self.note = f"{self._path}: not used: {error}; it is written anew"
             return None
-        beliefs = {name: widen(reported.beliefs[name], unknown_s) for name in self._names}
+        beliefs = {
+            name: widen(reported.beliefs[name], unknown_s, Wheels.of(self._scene.robot.base)) for name in self._names
+        }
         return Place(reported.stream, reported.seq, reported.pose), beliefs
 
     def keep(self, step: Step, beliefs: dict[str, np.ndarray]) -> None:
@@ -110,12 +112,12 @@ def _unknown_s(reported: Checkpoint, first: Received) -> float:
     return 0.0 if same else max(0.0, (age_ns - (row.seq + 1) * ROW_NS) / 1e9)
 
 
-def widen(components: np.ndarray, unknown_s: float) -> np.ndarray:
-    """Components after a time in which the robot did what nobody knows, at no more than the pilot's speeds.
+def widen(components: np.ndarray, unknown_s: float, wheels: Wheels) -> np.ndarray:
+    """Components after a time in which the robot did what nobody knows, at no more than the pilot's speeds on these wheels.
 
     Even over a disc of radius v t (variance (v t)^2 / 4 on each axis) and over w t to either side ((w t)^2 / 3).
     """
     out = np.array(components, COMPONENT)
-    out["sigma_m"] = np.hypot(out["sigma_m"], EXPLORE_M_S * unknown_s / 2.0)
-    out["sigma_rad"] = np.hypot(out["sigma_rad"], min(TURN_RAD_S * unknown_s, np.pi) / np.sqrt(3.0))
+    out["sigma_m"] = np.hypot(out["sigma_m"], wheels.explore_m_s * unknown_s / 2.0)
+    out["sigma_rad"] = np.hypot(out["sigma_rad"], min(wheels.turn_rad_s * unknown_s, np.pi) / np.sqrt(3.0))
     return out

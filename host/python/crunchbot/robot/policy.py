@@ -10,13 +10,13 @@ from ..nav.mapping import textures_in
 from ..nav.observations import observed
 from ..observation import Row, has_normals
 from ..pilot.choices import Choices
-from ..pilot.states import CLEAR_M, EXPLORE_M_S, TURN_RAD_S
+from ..pilot.states import CLEAR_M
+from ..pilot.wheels import Wheels
 from ..planning.coverage import Vehicle
 from ..planning.mapping import Mapping
 from ..scene import Arena, Robot, Scene
 
 RANDOM, MAP = "random", "map"
-VEHICLE = Vehicle(EXPLORE_M_S, TURN_RAD_S, CLEAR_M / EXPLORE_M_S, 0.25)
 
 
 def add_choices(parser: argparse.ArgumentParser) -> None:
@@ -51,12 +51,17 @@ class OwnMap:
         return self._mapper.map()
 
 
-def choices_of(name: str, robot: Robot, random: Choices) -> tuple[Choices, OwnMap | None]:
+def vehicle_of(wheels: Wheels) -> Vehicle:
+    """What a way costs a robot on these wheels."""
+    return Vehicle(wheels.explore_m_s, wheels.turn_rad_s, CLEAR_M / wheels.explore_m_s, 0.25)
+
+
+def choices_of(name: str, robot: Robot, wheels: Wheels, random: Choices) -> tuple[Choices, OwnMap | None]:
     """The choices of this name, and what must take every row that is sent; `random`: the behaviour's own."""
     if name == RANDOM:
         return random, None
     own = OwnMap(robot)
-    return Mapping(robot, VEHICLE, own.pose, own.map, random), own
+    return Mapping(robot, vehicle_of(wheels), own.pose, own.map, random), own
 
 
 def expected(choices: Choices) -> dict[str, str]:

@@ -9,10 +9,11 @@ sent when the block ended: the same run gives the same bytes. Live: as soon as i
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..base_table import BaseTable
 from ..pilot.base import Base, BaseError, Motion
 from ..pilot.wheels import NO_BUMPS, Bumps, Wheels
 from .simulation_link import SimLink
@@ -133,6 +134,7 @@ def _report(reported: Motion) -> Report:
     )
 
 
-def wheels_of(health: dict[str, str]) -> Wheels:
-    """What the base of this health can do."""
-    return Wheels.stepped(float(health["speed_step_m_s"]), float(health["wheel_base_m"]))
+def wheels_of(health: dict[str, str], base: BaseTable) -> Wheels:
+    """What the base of this health can do; `base`: as robot.toml has it."""
+    own = {"wheel_step_m_s": float(health["speed_step_m_s"]), "wheel_base_m": float(health["wheel_base_m"])}
+    return Wheels.of(replace(base, **own))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_pilot_behaviour import LEFT, RIGHT, Bench
 
+from crunchbot.base_table import BaseTable
 from crunchbot.pilot import base
 from crunchbot.pilot.behaviour import (
     BACK_OFF_M_S,
@@ -332,7 +333,7 @@ def test_whisk_for_the_tip_is_a_whisk_to_the_pilot():
 
 
 def test_a_base_with_stepped_wheels_whisks_as_far_at_its_own_rate():
-    wheels = Wheels.stepped(STEP_M_S, TRACK_M, effect_ticks=121)
+    wheels = Wheels.of(BaseTable(TRACK_M, wheel_step_m_s=STEP_M_S), effect_ticks=121)
     assert wheels.whisk_rad_s * TRACK_M / 2.0 == pytest.approx(STEP_M_S) and wheels.back_off_m_s == STEP_M_S
     assert wheels.push_ticks * wheels.whisk_rad_s == pytest.approx(EXACT.push_ticks * EXACT.whisk_rad_s, rel=0.01)
     robot = Robot(wheels=wheels)
@@ -349,6 +350,42 @@ def test_a_base_with_stepped_wheels_whisks_as_far_at_its_own_rate():
     robot.until(State.WHISK_OUT)
     assert 0 <= robot.tick - onset - wheels.push_ticks <= BLOCK_TICKS
     assert robot.behaviour.whisk.push_end == robot.tick + wheels.effect_ticks
+
+
+@pytest.mark.parametrize(
+    ("base", "share"),
+    [
+        (BaseTable(0.16, 0.22, 0.01, 1.0), 1.0),  # as quick as a Create is ordered to be
+        (BaseTable(0.16, 0.1, 0.01), 0.1 / 0.15),  # its wheels are slow
+        (BaseTable(0.6, 0.15, 0.01), 0.15 / (0.71 * 0.3)),  # its wheels are too far apart to turn so fast
+        (BaseTable(0.16, 0.22, 0.01, 0.1), math.sqrt(2 * 0.1 * 0.06) / 0.15),  # it brakes slowly
+    ],
+)
+def test_a_base_that_can_do_less_drives_and_turns_slower(base, share):
+    wheels = Wheels.of(base)
+    robot = Robot(wheels=wheels)
+    robot.until(State.FORWARD)
+    assert robot.behaviour.drive == pytest.approx((share * EXPLORE_M_S, 0.0))
+    assert wheels.sweeps(*robot.behaviour.drive)
+    robot.until(State.TURN)
+    v, omega = robot.behaviour.drive
+    assert v == 0.0 and abs(omega) == pytest.approx(share * 0.71)
+    for speeds in ((wheels.explore_m_s, 0.0), (0.0, wheels.turn_rad_s), (0.0, wheels.whisk_rad_s)):
+        assert base.reached(*speeds) == pytest.approx(speeds)
+
+
+def test_a_base_that_turns_evenly_only_when_fast_is_as_slow_as_it_can_be():
+    wheels = Wheels.of(BaseTable(0.5, 0.6, 0.3))
+    assert wheels.explore_m_s == wheels.back_off_m_s == 0.3
+    assert wheels.turn_rad_s == pytest.approx(0.3 / 0.25) == pytest.approx(wheels.whisk_rad_s)
+
+
+def test_wheels_that_gather_speed_are_not_taken_for_blocked():
+    base = BaseTable(0.16, 0.22, 0.01, 0.1)  # 0.11 m/s takes it 1.1 s
+    robot = Robot(wheels=Wheels.of(base))
+    robot.until(State.FORWARD)
+    reached = robot.behaviour.drive_since - robot.tick
+    assert reached == EFFECT_TICKS + math.ceil(robot.behaviour.drive[0] / 0.1 / TICK_S)
 
 
 @pytest.mark.parametrize(("bumps", "turn"), [(Bumps(left=True), -1.0), (Bumps(right=True), 1.0)])

@@ -12,6 +12,7 @@ from crunchbot.nav import filters
 from crunchbot.nav.filters import COMPONENT, Filter, SettingError
 from crunchbot.observation import Row
 from crunchbot.pilot.pilot import compose
+from crunchbot.pilot.wheels import EXACT
 from crunchbot.robot import checkpoint
 from crunchbot.robot.checkpoint import Checkpoint, CheckpointError
 from crunchbot.robot.memory import AGE_MOST_S, Memory, widen
@@ -185,7 +186,9 @@ def test_after_another_pilot_the_belief_is_wider_by_what_the_robot_could_do(made
     assert (place.stream, place.seq) == (7, 9)
     assert beliefs["grid"]["sigma_m"] == pytest.approx(np.hypot(0.02, 0.15 * 2.0 / 2.0))
     assert beliefs["grid"]["sigma_rad"] == pytest.approx(np.hypot(0.05, 0.71 * 2.0 / np.sqrt(3.0)))
-    assert widen(beliefs["grid"], 100.0)["sigma_rad"].max() < 2.1  # a heading that is anything is not more than that
+    assert (
+        widen(beliefs["grid"], 100.0, EXACT)["sigma_rad"].max() < 2.1
+    )  # a heading that is anything is not more than that
 
 
 def later(row: Received, seconds: float, stream: int | None = None, stamp_s: float | None = None) -> Received:

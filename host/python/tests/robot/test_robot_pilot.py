@@ -11,6 +11,7 @@ from linkkit import free_endpoint
 from models import model
 
 from crunchbot import scene as scenes
+from crunchbot.base_table import CREATE
 from crunchbot.bridge.ring import SAMPLE
 from crunchbot.commands import pilot as pilot_command
 from crunchbot.pilot.base import BaseLost, Motion
@@ -323,7 +324,7 @@ def test_every_order_reaches_the_base(monkeypatch):
 
 
 def test_the_whisk_is_what_the_base_can_turn_at():
-    first = wheels_of({"speed_step_m_s": "0.001000", "wheel_base_m": "0.258000"})
-    second = wheels_of({"speed_step_m_s": "0.028500", "wheel_base_m": "0.235000"})
+    first = wheels_of({"speed_step_m_s": "0.001000", "wheel_base_m": "0.258000"}, CREATE)
+    second = wheels_of({"speed_step_m_s": "0.028500", "wheel_base_m": "0.235000"}, CREATE)
     assert first.whisk_rad_s == pytest.approx(2 * 0.017 / 0.258) and first.back_off_m_s == pytest.approx(0.03)
     assert second.whisk_rad_s == pytest.approx(2 * 0.0285 / 0.235) and second.back_off_m_s == pytest.approx(0.0285)

@@ -8,12 +8,13 @@ import pytest
 from robotkit import to_rows
 
 from crunchbot import observation as o
+from crunchbot.base_table import CREATE, BaseTable
 from crunchbot.nav import localise
 from crunchbot.observation import Row, cell
 from crunchbot.pilot.pilot import compose
 from crunchbot.robot.network import messages as m
 from crunchbot.robot.network.inbox import Received
-from crunchbot.robot.network.row_checks import RowChecks
+from crunchbot.robot.network.row_checks import ANY, RowChecks
 from crunchbot.robot.network.rows import PIECES_MOST, Follower, RowPublisher, Step, between, to_message, to_row
 from crunchbot.robot.network.streams import Envelope
 from crunchbot_lab import scenes
@@ -267,8 +268,9 @@ def slow_rows(count: int) -> list[m.Observation]:
     )
 
 
-def fault_after(rows, row) -> str:
+def fault_after(rows, row, base: BaseTable = CREATE) -> str:
     checks = RowChecks()
+    checks._base = base
     assert not any(map(checks, received(rows)))
     return checks(Received("observation", row, received(rows)[-1].envelope))
 
@@ -293,6 +295,24 @@ def test_a_robot_moves_no_more_than_it_can_in_its_time(seconds, motion, why):
     assert reported.startswith(why) and bool(reported) == bool(why)
 
 
+@pytest.mark.parametrize(
+    ("motion", "why"),
+    [
+        ((0.54, 0.0, 0.0), ""),
+        ((0.56, 0.0, 0.0), "field pose: 0.56 m"),
+        ((0.0, 0.0, 3.1), ""),
+        ((0.0, 0.0, 3.3), "field pose: 0 m and 3.3 rad"),
+    ],
+)
+def test_without_a_scene_a_robot_moves_no_more_than_any_base(motion, why):
+    rows = slow_rows(10)
+    stamp = m.Header.at(rows[-1].header.stamp.ns + 10**8)
+    row = replace(rows[-1], seq=10, header=stamp, motion=np.array(motion), pose=compose(rows[-1].pose, motion))
+    reported = fault_after(rows, row, ANY)
+    assert reported.startswith(why) and bool(reported) == bool(why)
+    assert RowChecks()._base == ANY
+
+
 def test_motion_that_a_whisk_held_back_is_none_too_much():
     rows = slow_rows(10)
     for n in range(10, 30):
@@ -312,6 +332,7 @@ def test_motion_and_its_sum_must_agree():
 
 def test_after_rows_that_were_refused_the_next_good_one_is_taken():
     rows, checks = slow_rows(60), RowChecks()
+    checks._base = CREATE
     bad = [replace(row, pose=row.pose + [5.0, 0.0, 0.0]) for row in rows[10:40]]
     reported = list(map(checks, received([*rows[:10], *bad, *rows[40:]])))
     assert [bool(fault) for fault in reported] == [10 <= n < 40 for n in range(60)] and reported[10].startswith(

@@ -4,14 +4,16 @@ import math
 
 import numpy as np
 
-from ...base_table import CREATE
-from ...nav.faults import SLACK_M, SLACK_RAD
+from ...base_table import MOST_M_S, BaseTable
+from ...nav.faults import ROW_MOST_RAD, SLACK_M, SLACK_RAD
 from ...observation import NORMAL, Quantity, normal, parse
 from ...scene import Scene
 from .inbox import Received
 from .messages import REMEDIES, Observation
 from .rows import ROW_NS, between, leaps
 
+# The fastest wheels that robot.toml takes, and so close together that the base turns as far in a row as a filter takes.
+ANY = BaseTable(2.0 * MOST_M_S * ROW_NS / 1e9 / ROW_MOST_RAD, MOST_M_S)
 ROUNDING = 1e-6  # m and rad, between a row's motion and the sums on both sides
 
 
@@ -19,9 +21,9 @@ class RowChecks:
     """Judges the rows of an inbox, in their order; other messages pass."""
 
     def __init__(self, scene: Scene | None = None):
-        """scene: whose cells every row must have, and whose base moves; None: of any robot, on a Create."""
+        """scene: whose cells every row must have, and whose base moves; None: of any robot, on any base."""
         self._wanted, self._whiskers = (columns(scene), _whiskers(scene)) if scene else (frozenset(), ())
-        self._base = scene.robot.base if scene else CREATE
+        self._base = scene.robot.base if scene else ANY
         self._last: Received | None = None
         self._moved_ns = 0  # stamp of the newest row with any motion
 

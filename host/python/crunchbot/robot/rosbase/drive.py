@@ -93,11 +93,11 @@ class Drive:
         if self._base.acceleration_m_s2 is None:
             return self._wanted
         change = [wanted - now for wanted, now in zip(self._wanted, self.ordered, strict=True)]
-        wheel_m_s = abs(change[0]) + abs(change[1]) * self._base.wheel_base_m / 2.0
+        wheel_m_s = self._base.wheel_m_s(*change)
         share = min(1.0, self._base.acceleration_m_s2 * since_s / wheel_m_s) if wheel_m_s else 1.0
         return self.ordered[0] + share * change[0], self.ordered[1] + share * change[1]
 
     def _put(self, speeds: tuple[float, float], now_s: float) -> None:
         self.sent += self._send(*speeds)
         self.ordered, self._sent_s = speeds, now_s
-        self.asked = max(self.asked, speeds, key=lambda pair: abs(pair[0]) + abs(pair[1]) * self._base.wheel_base_m)
+        self.asked = max(self.asked, speeds, key=lambda pair: self._base.wheel_m_s(*pair))
