@@ -62,7 +62,7 @@ def test_filters_never_read_the_truth_and_earlier_rows_never_know_later_ones(fol
 
 def test_bad_cells_are_counted_and_the_run_goes_on(capsys, folder):
     path = folder / "observations.csv"
-    bad = [("odo_x_m", "inf"), ("odo_y_m", ""), ("floorL_VINYL", "nan"), ("floorR_ROUGH", "what")]
+    bad = [("odo_x_m", "far"), ("odo_y_m", ""), ("floorL_VINYL", "nan"), ("floorR_ROUGH", "what")]
     bad += [("w0_mm", "-5"), ("w1_mm", "what"), ("w2_mm", "-inf"), ("w3_mm", "9999"), ("t_s", "soon")]
     for row, (column, text) in enumerate(bad, start=3):
         replace_cell(path, row, column, text)
@@ -83,11 +83,11 @@ def test_repeated_and_reordered_rows_are_counted_and_answered(capsys, folder, tm
     assert len((tmp_path / "e.csv").read_text().splitlines()) == 42
 
 
-def test_no_rows_are_no_mistake(capsys, folder):
+def test_rows_without_a_row_are_an_error(capsys, folder):
     path = folder / "observations.csv"
     path.write_text(path.read_text().splitlines()[0] + "\n")
-    code, out, _ = run(capsys, "localise", folder, "--json")
-    assert code == 0 and json.loads(out)["steps"] == 0
+    code, out, err = run(capsys, "localise", folder, "--json")
+    assert code == 2 and out == "" and str(path) in err and err.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -222,7 +222,7 @@ def test_a_simulated_bridge_that_is_stopped_is_driven_to_its_end(monkeypatch):
     stop.set()
 
     class Course:
-        def __init__(self, path, drive, pace, over):
+        def __init__(self, over):
             self.over = over
             courses.append(self)
 
@@ -238,8 +238,7 @@ def test_a_simulated_bridge_that_is_stopped_is_driven_to_its_end(monkeypatch):
             super().send_signal(number)
 
     monkeypatch.setattr(bridge_sim, "stop_on_signals", lambda: stop)
-    monkeypatch.setattr(bridge_sim, "_command", lambda arguments, folder: ["sleep", "1000"])
-    monkeypatch.setattr(bridge_sim, "Course", Course)
+    monkeypatch.setattr(bridge_sim, "_command", lambda arguments, folder, over: (["sleep", "1000"], Course(over)))
     monkeypatch.setattr(bridge_sim.subprocess, "Popen", Process)
     assert main(["bridge-sim"]) == 0
     assert seen == [False, False, True]

@@ -6,13 +6,17 @@ import signal
 import subprocess
 import sys
 from dataclasses import dataclass
+from importlib.resources import files
 
 import pytest
 import writers
 from patience import PATIENCE_S
 from rings import ring_name
+from rosbasekit import scene_folder
 
 from crunchbot.cli import COMMANDS
+
+BAG = files("crunchbot") / "data/first_minute.mcap"
 
 # A function of the command says that it is called; one that works does so again and again, so that the signal comes while
 # it does, however fast the machine is.
@@ -60,7 +64,7 @@ def working(folder) -> dict[str, Case]:
         "scene map": Case(
             ("scene", "map", s, folder / "map.yaml", "--out", folder / "g"), f"{LAB}commands.scene:read_observations"
         ),
-        "scene from": Case(("scene", "from", folder / "r.mcap", "--out", folder / "h"), f"{LAB}scenes:read_recording"),
+        "scene from": Case(("scene", "from", BAG, "--out", folder / "h"), f"{LAB}scenes:read_recording"),
         "texture train": Case(
             ("texture", "train", folder / "d", "--out", folder / "t.json"),
             "crunchbot.touch.texture.model:read_training",
@@ -103,6 +107,8 @@ def serving(folder) -> dict[str, Case]:
         "ros2": ("ros2", s, *alone),
     }
     cases = {name: Case(given, f"{COMMANDS_OF}{name}:stop_on_signals", again=False) for name, given in words.items()}
+    base = ("base", scene_folder(folder / ring), "--socket", folder / "base.sock")
+    cases["base"] = Case(base, "crunchbot.robot.rosbase.command:stop_on_signals", again=False)
     return cases | {"view": Case(("view", "--port", 0), "crunchbot.view.command:listen", again=False)}
 
 
@@ -110,7 +116,7 @@ WORKING = (
     "localise", "map", "scene make", "scene map", "scene from", "texture train", "texture classify", "radial fit",
     "radial predict", "radial follow", "export", "examples", "doctor", "calibrate", "top", "record", "stream",
 )  # fmt: skip
-SERVING = ("replay", "navigator", "mapper", "bag", "pyro", "foxglove", "ros2", "view")
+SERVING = ("replay", "navigator", "mapper", "bag", "pyro", "foxglove", "ros2", "base", "view")
 TRIED_WITH_A_ROBOT = {"robot", "bridge-sim", "pilot", "try"}  # by tests of their own
 MOMENT = {"flash", "info"}  # one starts a program and waits for that, the other looks once
 

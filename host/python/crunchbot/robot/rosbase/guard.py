@@ -122,4 +122,7 @@ class Guard:
         while time.monotonic() < end_s:
             self._orders.send(0.0, 0.0)
             time.sleep(ALIVE_S)
-        return 1 if code else 0
+        if code == 0 or not self._spoke:  # before its first word it has ordered nothing
+            return 0
+        self._tell(f"the driver ended with {code}; zero was ordered for {REPEAT_S:.0f} s in its place")
+        return 1
