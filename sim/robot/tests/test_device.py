@@ -203,9 +203,9 @@ def doctor(folder: Path, *options) -> subprocess.CompletedProcess:
 def test_doctor_proves_a_bridge_without_a_node(tmp_path):
     """Also where nodes send something else."""
     done = doctor(tmp_path, "--level", "bytes", "--lanes-populated", "3")
-    assert "\n  ok    pattern: 1000 frames of 28 lanes are right" in done.stdout, done.stdout + done.stderr
+    assert "\nok    pattern: 1000 frames of 28 lanes are right" in done.stdout, done.stdout + done.stderr
 
 
 def test_doctor_notices_a_bridge_that_damages_its_pattern(tmp_path):
     done = doctor(tmp_path, "--level", "bytes", "--defect", "frame")
-    assert "\n  FAIL  pattern:" in done.stdout, done.stdout + done.stderr
+    assert "\nFAIL  pattern:" in done.stdout, done.stdout + done.stderr
