@@ -24,7 +24,8 @@ from crunchbot.nav.mapper import OneMap
 from crunchbot.planning.coverage import CoveragePlanner, Field, Vehicle
 from crunchbot.touch.contact import Contact
 from crunchbot.touch.contact_filter import ContactFilter
-from crunchbot.touch.radial.model import RadialModel, peak
+from crunchbot.touch.radial.curve import peak
+from crunchbot.touch.radial.model import RadialModel
 from crunchbot.touch.radial.shape import Contact as Whisk
 from crunchbot.touch.radial.shape import shape_of
 from crunchbot.touch.texture.classifier import Classifier, blocks_of, plain_features
@@ -126,7 +127,7 @@ CASES = {
     "touch.contact_filter.ContactFilter.run": Case(
         lambda **push: ContactFilter().run(*push.values()), PUSH, {"bases": (0, 1), "tilts": (0, 1), "good": (0,)}
     ),
-    "touch.radial.model.peak": Case(
+    "touch.radial.curve.peak": Case(
         lambda **given: peak(*given.values()), {"samples": NOISE, "rest": np.zeros(2)}, {"samples": (1,), "rest": (0,)}
     ),
     "touch.radial.model.RadialModel.fit": Case(

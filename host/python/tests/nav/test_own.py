@@ -75,8 +75,9 @@ def test_a_table_of_likelihoods_in_a_scene_folder_finds_the_robot(tmp_path, caps
     assert np.array_equal(sensor.likelihood, made.likelihood) and (sensor.at_m, sensor.cell_m) == ((0.05, 0.0), 0.1)
     read = localise.read_observations(localise.observations_path(tmp_path), again)
     assert np.array_equal(read.own, rows.own)
-    found = localise.run("grid", again, read)
-    assert np.median(np.hypot(*(found.poses - rows.truth)[-30:, :2].T)) < 0.1
+    for name in ("grid", "adaptive"):
+        off = np.hypot(*(localise.run(name, again, read).poses - rows.truth)[:, :2].T)
+        assert np.median(off[60:]) < 0.05, name
     row = {"t_s": 0.1, "odo_x_m": 0.0, "odo_y_m": 0.0, "odo_theta_rad": 0.0, "light": 0.5}
     filter = Filter("grid", again)
     cells = [
