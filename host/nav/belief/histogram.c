@@ -677,18 +677,29 @@ static void histogram_pass_open(struct nav_histogram *h)
     p->groups_end = all.end;
 }
 
+/* What is added to a cell of the line. */
+static float histogram_pass_extra(const struct nav_histogram *h, int column)
+{
+    const struct nav_pass *p = h->pass;
+    if (!(p->weigh->extra > 0.0) || !p->weigh->prior)
+        return (float)p->weigh->extra;
+    double x = (column + 0.5) * h->shape.cell + nav_histogram_shift_x(h, p->at.slice);
+    double y = (p->at.line + 0.5) * h->shape.cell + nav_histogram_shift_y(h, p->at.slice);
+    return (float)(p->weigh->extra * p->weigh->prior(p->weigh->self, x, y));
+}
+
 /* Mass of a group before it is weighed. */
 static void histogram_pass_mass(const struct nav_histogram *h, int g, float *mass)
 {
     const struct nav_pass *p = h->pass;
-    float same = (float)(p->weigh->extra + (h->uniform ? 1.0 / nav_shape_inside(&h->shape) : 0.0));
+    float even = h->uniform ? (float)(1.0 / nav_shape_inside(&h->shape)) : 0.0f;
     nav_lanes sum = {0.0f};
     for (int t = 0; t <= 2 * p->blur.reach && !h->uniform; t++)
         sum += p->blur.across[t] * *(const nav_lanes *)(p->row[t] + g * NAV_LANES);
     int inside = h->shape.nx - g * NAV_LANES;
     float least = (float)p->weigh->least;
     for (int k = 0; k < NAV_LANES; k++) {
-        float all = sum[k] + (k < inside ? same : 0.0f);
+        float all = sum[k] + (k < inside ? even + histogram_pass_extra(h, g * NAV_LANES + k) : 0.0f);
         mass[k] = all >= least ? all : 0.0f;
     }
 }

@@ -60,7 +60,8 @@ struct nav_weigh {
     long (*group)(void *self, int slice, int line, int group, const float *mass, float *like);
     void *self;
     double least; /* cells with a smaller share are dropped before they are weighed */
-    double extra; /* belief added to each cell before that */
+    double extra; /* belief added to each cell before that, by the prior of its place; NULL: the same everywhere */
+    double (*prior)(void *self, double x, double y);
 };
 
 /* Rows whose hazard is given at once, since a pass that gives it visits every cell: a robot that was carried is looked

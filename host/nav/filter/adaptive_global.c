@@ -178,6 +178,11 @@ static double global_hazard(struct adaptive_global *g, double hazard)
     return fmin(rows, NAV_HAZARD_ROWS) * hazard / nav_shape_inside(&g->histogram.shape);
 }
 
+static double global_prior(void *self, double x, double y)
+{
+    return nav_likelihood_prior(((struct adaptive_global *)self)->likelihood, x, y);
+}
+
 static void global_pass(struct adaptive_global *g, struct adaptive_log *log, double hazard)
 {
     struct nav_histogram *h = &g->histogram;
@@ -196,7 +201,8 @@ static void global_pass(struct adaptive_global *g, struct adaptive_log *log, dou
     g->weigh = (struct nav_weigh){.group = first ? global_look_up : global_work_out,
                                   .self = g,
                                   .least = NAV_SHARE_LEAST / g->first.cells,
-                                  .extra = global_hazard(g, hazard)};
+                                  .extra = global_hazard(g, hazard),
+                                  .prior = global_prior};
     g->touched += nav_histogram_pass(h, g->job.step, &g->weigh, nav_compose(g->summary.mean, g->job.step));
 }
 

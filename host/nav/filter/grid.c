@@ -84,15 +84,20 @@ static long grid_weigh_group(void *self, int p, int line, int group, const float
 /* What every cell is given of the chance that the robot was put there. */
 static double grid_hazard(struct grid *g)
 {
-    double hazard = g->problem->settings.motion.hazard;
+    double hazard = nav_problem_hazard(g->problem);
     if (++g->unhazarded < NAV_HAZARD_ROWS || g->histogram.uniform)
         return 0.0;
     g->unhazarded = 0;
     return NAV_HAZARD_ROWS * hazard / nav_shape_inside(&g->histogram.shape);
 }
 
-/* Moves, multiplies by the likelihood and normalises; `extra` is added to each cell first. Returns false with no mass.
- */
+static double grid_prior(void *self, double x, double y)
+{
+    return nav_likelihood_prior(((struct grid *)self)->likelihood, x, y);
+}
+
+/* Moves, multiplies by the likelihood and normalises; `extra` is added to each cell first, by the prior of its place.
+ * Returns false with no mass. */
 static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
 {
     static const struct nav_weigh noise = {.group = NULL};
@@ -107,8 +112,9 @@ static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
     double least = NAV_SHARE_LEAST / nav_shape_inside(&h->shape);
     g->weigh = (struct nav_weigh){.group = grid_weigh_group,
                                   .self = g,
-                                  .least = g->problem->settings.motion.hazard > 0.0 ? least : 0.0,
-                                  .extra = extra};
+                                  .least = nav_problem_hazard(g->problem) > 0.0 ? least : 0.0,
+                                  .extra = extra,
+                                  .prior = grid_prior};
     g->slice = -1;
     nav_histogram_pass(h, step, &g->weigh, g->mean);
     return h->total > 0.0 && isfinite(h->total);
@@ -221,7 +227,7 @@ static struct nav_motion grid_calibrated(struct grid *g, const struct nav_motion
 static void grid_carry(struct grid *g)
 {
     const double each = NAV_CARRIED / (1.0 - NAV_CARRIED) / nav_shape_inside(&g->histogram.shape);
-    const struct nav_weigh more = {.extra = each};
+    const struct nav_weigh more = {.self = g, .extra = each, .prior = grid_prior};
     if (!(g->histogram.total > 0.0) || g->histogram.uniform)
         return;
     nav_histogram_pass(&g->histogram, (struct nav_pose){0.0, 0.0, 0.0}, &more, g->mean);

@@ -210,7 +210,7 @@ static void a_pass_is_what_a_dense_computation_gives(void **state)
     (void)state;
     for (int kind = 0; kind < 3; kind++) { /* mass alone; light cells dropped; belief added everywhere */
         struct nav_histogram h = scattered();
-        const struct nav_weigh weigh = {weigh_group, NULL, kind == 1 ? 1e-3 : 0.0, kind == 2 ? 1e-4 : 0.0};
+        const struct nav_weigh weigh = {weigh_group, NULL, kind == 1 ? 1e-3 : 0.0, kind == 2 ? 1e-4 : 0.0, NULL};
         double *expected = dense(&h);
         naive(expected, &h.shape, 0.2, 0.15, weigh.extra, weigh.least);
         h.pending_position = 0.4 * h.shape.cell * h.shape.cell;
