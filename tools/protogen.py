@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Generates protocol/gen/ (C, Verilog, Markdown) from protocol/whisker.toml.
+"""Generates protocol/gen/ (C, Verilog) from protocol/whisker.toml; `make docs` takes the page of tables from here.
 
 protogen.py            write the files
 protogen.py --check    exit 1 if a committed file is not what would be written
@@ -166,7 +166,7 @@ def markdown() -> str:
     out = [
         "# Wire format",
         "",
-        f"<!-- {NOTICE} -->",
+        "From `protocol/whisker.toml`, which also makes the constants of C and Verilog.",
         "",
         f"Wire version {p.WIRE_VERSION}. Multi-byte fields are little-endian.",
         "",
@@ -206,7 +206,7 @@ def _table(title: str, column: str, entries: dict, key: str) -> list[str]:
     return [f"## {title}", "", f"| {column} | name | cause | remedy |", "|---|---|---|---|", *rows, ""]
 
 
-OUTPUTS = {"whisker_protocol.h": c_header, "whisker_protocol.vh": verilog_header, "protocol.md": markdown}
+OUTPUTS = {"whisker_protocol.h": c_header, "whisker_protocol.vh": verilog_header}
 
 
 def main() -> int:

@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -82,6 +83,19 @@ def test_a_code_span_that_names_no_file_is_found():
     assert [span for span in there if not is_there(span, ROOT / "README.md")] == []
     gone = ("host/nav/gone", "gone.c", "whisker/pilot/rules.py", "docs/gone.md", "tests/gone/")
     assert [span for span in gone if is_there(span, ROOT / "README.md")] == []
+
+
+def tables(text: str) -> list[str]:
+    """Code of a page that is TOML: blocks that begin with a table's name or a key."""
+    blocks = re.findall(r"```\w*\n(.*?)```", text, re.DOTALL)
+    blocks += [part.replace("\n    ", "\n") for part in re.findall(r"(?:^\n?    .*\n)+", text, re.MULTILINE)]
+    return [block for block in map(str.strip, blocks) if re.match(r"\[\[?\w[\w.]*\]|\w+ = [\[{\"\d]", block)]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_tables_of_toml_can_be_read(page):
+    for block in tables(page.read_text()):
+        tomllib.loads(block)
 
 
 def test_every_page_stands_on_a_shelf():

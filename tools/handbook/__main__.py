@@ -12,6 +12,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from protogen import markdown
+
 from .links import broken, unreached
 from .reference import write_reference
 
@@ -62,13 +64,16 @@ def environment(out: Path) -> dict[str, str]:
 
 
 def stage(source: Path) -> None:
-    """Copies of the tracked files: pages, and what pages refer to."""
+    """Copies of the tracked files: pages, and what pages refer to; the wire format, which pages name by its definition, as tables."""
     listed = subprocess.run(["git", "-C", ROOT, "ls-files", "-z"], capture_output=True, text=True, check=True).stdout
     for name in filter(None, listed.split("\0")):
         path = source / name
         path.parent.mkdir(parents=True, exist_ok=True)
         if (ROOT / name).is_file():
             shutil.copyfile(ROOT / name, path)
+        if path.suffix == ".md":
+            path.write_text(path.read_text().replace("protocol/whisker.toml)", "protocol/wire_format.md)"))
+    (source / "protocol/wire_format.md").write_text(markdown())
     shutil.copyfile(HERE / "index.rst", source / "index.rst")
 
 

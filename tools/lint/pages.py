@@ -9,7 +9,7 @@ from pathlib import Path
 from .tree import ROOT, read, tracked, written
 
 WIDTH = 120
-LINES = 6400  # of Markdown in all, the wire format and tables of results among them: what is there, and two pages more
+LINES = 5980  # of Markdown in all, tables of results among them
 NOTES = 15  # README.md in folders other than the first and docs
 MEAN, LONG, SHARE = 15.0, 35, 0.02  # words a sentence; words of a long one; share of long ones
 

@@ -27,7 +27,7 @@ struct whisker_identity {
     uint32_t clock_hz;
     uint16_t frame_bytes;
     uint16_t fifo_bytes;
-    uint8_t board;       /* a number of `boards` in protocol.md */
+    uint8_t board;       /* a number of `boards` in whisker.toml */
     uint8_t wired_lanes; /* that have a pin; 0: gateware before version 3 does not report it */
     uint16_t build;      /* first 16 bits of the gateware's commit; 0: not known */
 };
@@ -36,7 +36,7 @@ struct whisker_identity {
 #define WHISKER_OPTION_TICK_IN 1     /* ticks begin with edges of the pin tick_in, tick_period apart */
 #define WHISKER_OPTION_FALLING 2     /* with its falling edges */
 #define WHISKER_OPTION_EVERY_FRAME 4 /* each frame is sent at once; else a USB packet waits for its second frame */
-#define WHISKER_OPTION_PATTERN 8     /* records of the bridge's own, whatever the lanes say: see protocol.md */
+#define WHISKER_OPTION_PATTERN 8     /* records of the bridge's own, whatever the lanes say: see whisker.toml */
 
 /* How the bridge is to run; unit of all but mask and batch: cycle of its 60 MHz clock. */
 struct whisker_settings {
@@ -52,7 +52,7 @@ struct whisker_settings {
 };
 
 /* When the latest tick was, and what came in at tick_in since the start; meanings and units: report `timing` in
- * protocol.md. */
+ * whisker.toml. */
 struct whisker_timing {
     uint32_t tick;
     uint16_t usb_time;

@@ -14,10 +14,10 @@ extern "C" {
 #define WHISKER_FRAME_LANES 28
 #define WHISKER_FRAME_LAST 1            /* bit of flags: the last frame after a stop */
 #define WHISKER_FRAME_GAP 256           /* bit of flags, set by the host: the first frame after the bridge had gone */
-#define WHISKER_FRAME_USB_TIME_SHIFT 16 /* of flags: from this bit on usb_time of the wire, see protocol.md */
+#define WHISKER_FRAME_USB_TIME_SHIFT 16 /* of flags: from this bit on usb_time of the wire, see whisker.toml */
 #define WHISKER_STATUS_ERROR_BITS 10    /* of a status, from bit 0: the sensor's errors; above them: the code */
 
-/* What one lane delivered: counts (0x8000 at rest, 65536 counts = 180 degrees); status: 0 good, see protocol.md. */
+/* What one lane delivered: counts (0x8000 at rest, 65536 counts = 180 degrees); status: 0 good, see whisker.toml. */
 struct whisker_sample {
     uint16_t alpha;
     uint16_t beta;

@@ -2,7 +2,7 @@
  * Asking the nodes: identity, health, firmware updates, through a bridge whose ticks run (whisker_device_start).
  *
  * One order goes to all nodes at once; each answers when it can. A node may be silent for 30 ms while it erases flash.
- * Answers are 32-bit values; see protocol.md (service) for what they mean. All waiting is done in whisker_device_poll,
+ * Answers are 32-bit values; see whisker.toml (service) for what they mean. All waiting is done in whisker_device_poll,
  * so frames go on to the sink of whisker_device_start.
  *
  * Threads and errors: as in device.h.
