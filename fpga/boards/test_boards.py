@@ -84,8 +84,7 @@ def test_pins_are_those_that_the_page_tells_to_solder(name):
 
 
 def test_the_i9s_phy_is_wired_as_the_page_tells():
-    _, *rows = table("### Wiring a USB3300 module")
-    reported = {row[at]: row[at + 1] for row in rows for at in (0, 3) if re.fullmatch(r"[A-Z]\d+", row[at + 1])}
+    reported = dict(zip(*table("### Wiring a USB3300 module"), strict=True))
     pins = build.load("colorlight_i9").pins
     wires = {"CLKOUT": "clk_60", "DIR": "ulpi_dir", "NXT": "ulpi_nxt", "STP": "ulpi_stp", "RESET": "ulpi_reset"}
     wanted = {theirs: pins[ours] for theirs, ours in wires.items()}

@@ -89,7 +89,7 @@ def main(paths: list[str]) -> None:
     runs = [json.loads(Path(path).read_text()) for path in paths]
     write_result("drills", summary(runs))
     before, _, rest = PAGE.read_text().partition(BEGIN)
-    PAGE.write_text(f"{before}{BEGIN}\n\n{table(runs)}\n{END}{rest.partition(END)[2]}")
+    PAGE.write_text(f"{before}{BEGIN}\n\n{table(runs)}{END}{rest.partition(END)[2]}")
 
 
 if __name__ == "__main__":

@@ -129,10 +129,22 @@ def test_the_tables_of_pages_are_what_the_stored_results_give(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "tools"))
     from benches import tables
 
-    assert len(tables.pages()) > 10
+    assert len(tables.pages()) > 5
     for path in tables.pages():
         text = path.read_text()
         assert tables.written(text) == text, f"{path}: run '.venv/bin/python tools/benches page'"
+
+
+def test_the_tables_of_the_site_can_be_made(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from benches import tables
+
+    pages = {path: path.read_text() for path in ROOT.glob("docs/**/*.md")}
+    found = {path: text for path, text in pages.items() if "<!-- table of the site" in text}
+    assert len(found) > 4
+    for text in found.values():
+        whole = tables.of_site(text)
+        assert "table of the site" not in whole and whole.count("\n| ") > text.count("\n| ")
 
 
 def test_no_page_says_how_fast_the_chain_runs_but_the_generated_ones():

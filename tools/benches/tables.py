@@ -4,6 +4,7 @@
     <!-- end -->
 
 stands what the function `matrix` of benches/nav/tables.py makes of bench/results. Words after the name are arguments.
+A page's lesser tables are in the site alone (`make docs`), at `<!-- table of the site: nav.matrix -->`.
 
     .venv/bin/python tools/benches page        writes all tables again, without measuring
 """
@@ -17,6 +18,7 @@ from string import Formatter
 from .store import ROOT
 
 MARKS = re.compile(r"(<!-- table: (\w+)\.(\w+)([^>]*?) -->\n).*?(<!-- end -->)", re.DOTALL)
+OF_SITE = re.compile(r"<!-- table of the site: (\w+)\.(\w+)([^>]*?) -->\n")
 NONE = "-"
 Cell = str | Callable[[dict], object]
 
@@ -73,15 +75,19 @@ def pages() -> list[Path]:
     return [path for path in every if MARKS.search(path.read_text())]
 
 
+def made(room: str, name: str, words: str) -> str:
+    """What a mark stands for."""
+    return getattr(importlib.import_module(f"benches.{room}.tables"), name)(*words.split())
+
+
 def written(text: str) -> str:
     """A page's text with its tables made of what is stored now."""
+    return MARKS.sub(lambda found: f"{found[1]}{made(*found.groups()[1:4])}{found[5]}", text)
 
-    def made(found: re.Match) -> str:
-        begin, room, name, words, end = found.groups()
-        module = importlib.import_module(f"benches.{room}.tables")
-        return f"{begin}\n{getattr(module, name)(*words.split())}\n{end}"
 
-    return MARKS.sub(made, text)
+def of_site(text: str) -> str:
+    """A page's text with the tables that the site alone has."""
+    return OF_SITE.sub(lambda found: made(*found.groups()), text)
 
 
 def run(_build: Path | None = None) -> None:

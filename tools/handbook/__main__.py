@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from benches import tables
 from protogen import markdown
 
 from .links import broken, unreached
@@ -64,7 +65,8 @@ def environment(out: Path) -> dict[str, str]:
 
 
 def stage(source: Path) -> None:
-    """Copies of the tracked files: pages, and what pages refer to; the wire format, which pages name by its definition, as tables."""
+    """Copies of the tracked files: pages, and what pages refer to; with the tables that git does not hold, and the wire format as
+    such, which pages name by its definition."""
     listed = subprocess.run(["git", "-C", ROOT, "ls-files", "-z"], capture_output=True, text=True, check=True).stdout
     for name in filter(None, listed.split("\0")):
         path = source / name
@@ -72,7 +74,8 @@ def stage(source: Path) -> None:
         if (ROOT / name).is_file():
             shutil.copyfile(ROOT / name, path)
         if path.suffix == ".md":
-            path.write_text(path.read_text().replace("protocol/whisker.toml)", "protocol/wire_format.md)"))
+            text = path.read_text().replace("protocol/whisker.toml)", "protocol/wire_format.md)")
+            path.write_text(tables.of_site(text))
     (source / "protocol/wire_format.md").write_text(markdown())
     shutil.copyfile(HERE / "index.rst", source / "index.rst")
 

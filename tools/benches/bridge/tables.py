@@ -1,9 +1,8 @@
-"""Tables of docs/results/robot.md, host.md, docs/record.md and docs/boards.md."""
+"""Tables of docs/results/robot.md and docs/boards.md."""
 
 from ..store import read_result
 from ..tables import lined, table
 
-PAPER_MM = (5.68, 2.78, 1.82, 4.37)  # the paper's errors of whiskers 1 to 4
 WAYS, CELLS = ("out_ns", "in_ns", "through_ns"), ("LUT", "FF", "block RAM", "distributed RAM")
 GOAL_MHZ = 60.0
 
@@ -57,59 +56,3 @@ def demo_errors() -> str:
         p90 = run.get(f"{key}_error_p90_m")
         rows.append([name, f"{1000 * run[f'{key}_error_median_m']:.0f}", "" if p90 is None else f"{1000 * p90:.0f}"])
     return table(["estimate", "median position error, mm", "90 % of the rows, mm"], rows)
-
-
-def demo() -> str:
-    run = read_result("demo")
-    return lined(
-        [{"what": what, "value": value.format_map(run)} for what, value in DEMO.items()]
-        + [{"what": "both are the same records", "value": "yes" if run["records_bad_match"] else "no"}]
-        + [
-            {"what": what, "value": f"{100 * run[key]:.1f} %"}
-            for what, key in (
-                ("texture decisions right, 50 mm inside a tile", "texture_accuracy"),
-                ("the same, tips near borders too", "texture_accuracy_all"),
-                ("share of the moving windows that were read", "texture_windows_share"),
-            )
-        ],
-        {"figure": "{what}", "value": "{value}"},
-    )
-
-
-DEMO = {
-    "frames sent, received, lost": "{frames_sent}, {frames_received}, {frames_lost}",
-    "USB faults put in": "{usb_faults_injected}",
-    "bad records put in, reported": "{records_bad_injected}, {records_bad_reported}",
-    "median heading error, grid": "{heading_error_median_rad:.3f} rad",
-}
-
-
-def demo_radial() -> str:
-    run = read_result("demo")
-    pairs = zip(run["radial_std_mm"].values(), run["radial_std_predicted_mm"].values(), PAPER_MM, strict=True)
-    rows = [[str(n), *(f"{value:.2f}" for value in of)] for n, of in enumerate(pairs, 1)]
-    return table(["whisker", "measured", "predicted", "paper"], rows)
-
-
-def fuzz() -> str:
-    found = read_result("fuzz")
-    row = found | {"names": ", ".join(sorted(found["targets"]))}
-    return lined([row], {"targets": "{names}", "inputs": "{inputs}", "crashes": "{crashes}"})
-
-
-def latency() -> str:
-    def us(name: str) -> str:
-        return "{%s[median_us]:.0f}, worst {%s[worst_us]:.0f} us" % (name, name)  # noqa: UP031
-
-    return lined(
-        read_result("bridge_timing"),
-        {
-            "node link": lambda run: f"SCK/{run['sck_divider']}, gap {run['word_gap'] / 60:g} us",
-            "ticks": lambda run: f"{60e6 / run['tick_period']:.0f} Hz",
-            "sent": lambda run: "every frame at once" if run["every_frame"] else "two frames a packet",
-            "SYNC to the end of its packet": us("packet"),
-            "of its transfer, batch 2": us("batch_2"),
-            "batch 4": us("batch_4"),
-            "frames with a bad record": "{bad_records} of {frames}",
-        },
-    )

@@ -1,4 +1,4 @@
-"""Tables of docs/results/ring.md and host.md."""
+"""Tables of docs/results/host.md."""
 
 from ..store import read_result
 from ..tables import lined, named, table
@@ -36,16 +36,6 @@ def ring(mode: str) -> str:
     return table([*head, f"frames a second to every reader: {counts}"], lines)
 
 
-def writer() -> str:
-    rows, readers = found()
-    lines = [
-        [str(n), f"{rows['whisker', 'poll', '2khz', n]['publish_ns']:.0f}"]
-        + [f"{rows['whisker', 'wait', '2khz', n]['publish_ns'] / 1000:.1f}"]
-        for n in readers
-    ]
-    return table(["readers", "they poll, ns", "they wait, us"], lines)
-
-
 def instructions() -> str:
     return lined(
         named(read_result("host")["instructions_per_frame"], "batch"),
@@ -55,13 +45,6 @@ def instructions() -> str:
             "ours of these": lambda row: f"{row['libwhisker and whiskerd']:.0f}",
             "share of the netbook": "{atom_share:100*.2f} %",
         },
-    )
-
-
-def clock() -> str:
-    columns = {"seed": "{seed}", "largest error, us": "{error_us_max:.0f}"}
-    return lined(
-        named(read_result("host")["clock"], "seed"), columns | {"within the stated uncertainty": "{covered:100*.2f} %"}
     )
 
 
@@ -77,14 +60,3 @@ def record() -> str:
             ["share of the netbook", f"{100 * found['atom_share']:.1f} %"],
         ],
     )
-
-
-def damage() -> str:
-    readers: dict[str, list[dict]] = {}
-    for key, row in read_result("damage")["readers"].items():
-        readers.setdefault(key.partition(":")[0], []).append(row)
-    rows = []
-    for name, files in readers.items():
-        read, intact, unsaid = (sum(row[key] for row in files) for key in ("read", "intact", "unsaid"))
-        rows.append([name, f"{100 * read / intact:.1f} %", str(unsaid)])
-    return table(["reader", "read", "silent losses"], rows)

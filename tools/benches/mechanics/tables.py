@@ -1,4 +1,4 @@
-"""Tables of docs/results/mechanics.md."""
+"""The table of docs/methods/mechanics.md."""
 
 from ..store import read_result
 from ..tables import table

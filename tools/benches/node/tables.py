@@ -4,11 +4,6 @@ from ..store import read_result
 from ..tables import lined, named, table
 
 LOST = ((0, 0), (1, 1), (2, 2), (3, 10), (11, 50), (51, 300))  # groups of ticks
-MHZ = 38.6925  # instructions a microsecond
-
-
-def spread(values: list[int]) -> str:
-    return f"{min(values)}" if min(values) == max(values) else f"{min(values)} to {max(values)}"
 
 
 def faults() -> str:
@@ -87,27 +82,3 @@ def image() -> str:
             "ticks until records return, at most": "{ticks_most}",
         },
     )
-
-
-def image_sums() -> str:
-    found = read_result("node_image")
-    bad = sum(one["unexplained"] + one["spurious"] + one["stuck"] for one in found["storm"])
-    return table(
-        ["what", "value"],
-        [
-            [
-                "schedules of random faults, resets and traps among them",
-                f"{sum(s['schedules'] for s in found['storm']):,}",
-            ],
-            ["records of these that no check explains, too many or for ever", str(bad)],
-            ["interrupts that left a register, flag, page or count other than they found it", str(found["spoiled"])],
-            ["data and stack, of the memory before the DMA's: at most, bytes", str(found["ram"])],
-            ["reset to the main loop, image check included: at most, cycles", f"{found['boot_cycles']:,}"],
-        ],
-    )
-
-
-def by_path() -> str:
-    found = read_result("node_image")["by_path"]
-    rows = [[name, str(cycles), f"{cycles / MHZ:.1f}"] for name, cycles in found.items()]
-    return table(["interrupt", "cycles", "us"], rows)

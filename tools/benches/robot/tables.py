@@ -23,18 +23,3 @@ def long() -> str:
             "longest (s)": "{longest_loss_s:.1f}",
         },
     )
-
-
-def long_met() -> str:
-    return lined(
-        named(read_result("robot_long"), "run"),
-        {
-            "run": "{run}",
-            "driven (m)": "{driven_m:.0f}",
-            "tiles": "{tiles_visited} of {tiles}",
-            "contacts": "{contacts}",
-            "whisks measured": "{whisks}",
-            "texture right": "{texture_accuracy:100*.1f} %",
-            "times real time, wall": lambda run: f"{run['simulated_s'] / run['chain_wall_s']:.2f}",
-        },
-    )
