@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DIST = ROOT / "dist/debian"
 RELEASES = ("bookworm", "trixie")  # Debian 12 and 13
 STALE = '--aptopt=Acquire::Check-Valid-Until "false"'  # a mirror that lags behind serves for this check
+QUICK = "--dpkgopt=force-unsafe-io"  # the roots are thrown away: nothing of them need reach the disk
 DEVELOPMENT = "libwhisker-dev"
 PACKAGES = (
     "whiskerd",
@@ -70,7 +71,7 @@ def build_dependencies() -> list[str]:
 
 def make_root(release: str, variant: str, packages: list[str], folder: Path, log: Path) -> None:
     included = [f"--include={','.join(packages)}"] if packages else []
-    run(f"{release}: root with {len(packages)} packages", log, "mmdebstrap", f"--variant={variant}", STALE, *included,
+    run(f"{release}: root with {len(packages)} packages", log, "mmdebstrap", f"--variant={variant}", STALE, QUICK, *included,
         release, folder)  # fmt: skip
 
 
