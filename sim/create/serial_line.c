@@ -71,6 +71,7 @@ static void serial_line_pass(sim_create *create, uint8_t byte)
     if (serial_line_happens(rng, options->flip))
         byte = (uint8_t)(byte ^ 1u << (sim_rng_next(rng) >> 61));
     byte = (uint8_t)(byte ^ (flip ? flip->value : 0));
+    byte = create_line_agrees(&create->line) ? byte : 0; /* a break, to the other end */
     serial_line_leave(&create->line, byte);
     if (serial_line_happens(rng, options->extra))
         serial_line_leave(&create->line, (uint8_t)(sim_rng_next(rng) >> 56));
@@ -82,8 +83,8 @@ bool create_line_arrives(sim_create *create, uint8_t *byte)
     const uint64_t place = create->line.places.received++;
     const struct sim_create_fault *flip = create_fault_at(create, SIM_CREATE_FLIP_ORDER, place);
     *byte = (uint8_t)(*byte ^ (flip ? flip->value : 0));
-    return !(create->stimuli & (SIM_CREATE_DEAF | SIM_CREATE_RESTART)) && !create->asleep &&
-           !serial_line_happens(&create->line.in_rng, create->options.lose_orders) &&
+    return create_line_agrees(&create->line) && !(create->stimuli & (SIM_CREATE_DEAF | SIM_CREATE_RESTART)) &&
+           !create->asleep && !serial_line_happens(&create->line.in_rng, create->options.lose_orders) &&
            !create_fault_at(create, SIM_CREATE_LOSE_ORDER, place);
 }
 

@@ -54,7 +54,7 @@ static void sim_create_bring(sim_create *create)
     struct create_line *line = &create->line;
     const uint64_t byte_costs = (uint64_t)CREATE_OI_BITS_PER_BYTE * TICKS_PER_S;
     size_t come = 0;
-    line->in_credit = line->queued_count > 0 ? line->in_credit + line->baud : 0;
+    line->in_credit = line->queued_count > 0 ? line->in_credit + (line->host_baud ? line->host_baud : line->baud) : 0;
     for (; come < line->queued_count && line->in_credit >= byte_costs; line->in_credit -= byte_costs)
         sim_create_hear(create, line->queued[come++]);
     line->queued_count -= come < line->queued_count ? come : line->queued_count;
@@ -183,6 +183,11 @@ void sim_create_speed(const sim_create *create, double *v_m_s, double *omega_rad
 enum create_oi_mode sim_create_mode(const sim_create *create)
 {
     return create->mode;
+}
+
+void sim_create_host_baud(sim_create *create, unsigned baud)
+{
+    create->line.host_baud = baud;
 }
 
 unsigned sim_create_baud(const sim_create *create)

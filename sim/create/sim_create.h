@@ -135,6 +135,9 @@ enum create_oi_mode sim_create_mode(const sim_create *create);
 struct sim_create_places {
     uint64_t sent, received, frames;
 };
+/* What the host's end of the line goes by, from now on: at another speed than the robot's neither is heard. 0: by what
+ * the robot's goes by, as it is until this is called. */
+void sim_create_host_baud(sim_create *create, unsigned baud);
 /* What its line goes by: an order may have changed it. */
 unsigned sim_create_baud(const sim_create *create);
 struct sim_create_places sim_create_where(const sim_create *create);

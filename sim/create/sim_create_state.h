@@ -40,7 +40,7 @@ struct create_line {
     uint8_t waiting[QUEUE_MAX];
     size_t count;
     size_t frame; /* of these, how many up to the end of the last stream frame */
-    unsigned baud, next_baud;
+    unsigned baud, next_baud, host_baud;
     uint64_t change_at; /* tick at which next_baud is in force; 0: never */
     uint64_t credit;    /* what the line could have sent: ticks times baud */
     uint8_t left[SIM_CREATE_OUT_MAX];
@@ -126,6 +126,11 @@ void create_battery_tick(sim_create *create);
 int32_t create_battery_current(const sim_create *create); /* mA, negative: out of the battery */
 int32_t create_battery_voltage(const sim_create *create); /* mV */
 int32_t create_battery_capacity(void);                    /* mAh */
+
+static inline bool create_line_agrees(const struct create_line *line)
+{
+    return line->host_baud == 0 || line->host_baud == line->baud;
+}
 
 static inline int16_t create_int16(const uint8_t *bytes)
 {

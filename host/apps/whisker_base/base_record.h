@@ -89,6 +89,8 @@ struct base_robot {
     unsigned requests;         /* for frames, so far */
     unsigned unheard_requests; /* since the newest frame */
     bool request_due;          /* another is to be written */
+    unsigned recalls;          /* since a frame came */
+    bool recalled;             /* by the newest: the line goes at another speed */
     bool answered;             /* a frame has come that the newest request asked for */
     enum create_oi_mode wanted;
     enum base_phase phase;

@@ -49,6 +49,9 @@ struct guard {
 /* Writes a stop; false: there is no port, or no room in it. */
 static bool whisker_base_guard_stop_wheels(struct guard *guard)
 {
+    if (guard->port >= 0) {
+        create_port_set_baud(guard->port, guard->options->baud); /* the driver may have called at another speed */
+    }
     guard->stood = guard->port >= 0 && create_port_stop(guard->port);
     return guard->stood;
 }

@@ -134,7 +134,8 @@ bool base_orders_heard(const struct base_robot *robot)
 static void orders_flush_wheels(struct base_robot *robot, int64_t now_ms)
 {
     const bool stop = orders_stand(&robot->speeds), urgent = stop && robot->may_turn;
-    if (!robot->due || (!urgent && orders_wait(robot, robot->written_ms, now_ms)) || !orders_write_wheels(robot)) {
+    if (!robot->due || robot->recalled || (!urgent && orders_wait(robot, robot->written_ms, now_ms)) ||
+        !orders_write_wheels(robot)) {
         return;
     }
     if (robot->speeds.left_mm_s != robot->written.left_mm_s || robot->speeds.right_mm_s != robot->written.right_mm_s) {
@@ -156,7 +157,7 @@ void base_orders_flush(struct base_robot *robot, int64_t now_ms)
         orders_flush_wheels(robot, now_ms);
     }
     uint8_t bytes[CREATE_COMMAND_BYTES];
-    if (robot->port >= 0 && robot->opcode && !orders_wait(robot, robot->opcode_ms, now_ms) &&
+    if (robot->port >= 0 && robot->opcode && !robot->recalled && !orders_wait(robot, robot->opcode_ms, now_ms) &&
         base_orders_write(robot, bytes, create_put_opcode(bytes, robot->opcode))) {
         robot->opcode_ms = now_ms;
         base_orders_drop_opcode(robot);

@@ -17,6 +17,8 @@
 #define COMMANDER_FRAMES (BASE_COMMANDER_MS / CREATE_OI_PERIOD_MS)
 /* Frames of an earlier request that may still be on their way. */
 #define OWN_FRAMES 5
+/* From a request to the frame it asks for: both on the line, the period, what an adapter holds back. */
+#define ANSWER_MS (4 * CREATE_OI_PERIOD_MS)
 #define BOOT_BYTE 0xfe /* of a boot loader that starts again and again, in reports of users */
 
 /* ---------------------------------------------------------------------------------------------------------- the line
@@ -77,7 +79,8 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
     create_port_forget(robot->port); /* what was said before is not believed */
     robot->error = 0;
     robot->sent = 0;
-    robot->silent = false;
+    robot->silent = robot->recalled = false;
+    robot->recalls = 0;
     robot->unseen = robot->frame_ms > 0;
     robot->low_brc = -1;
     robot->requests += robot->options->stream_clock ? 0 : (unsigned)now_ms; /* a driver before had orders of its own */
@@ -212,6 +215,7 @@ static void whisker_base_robot_take_frame(struct base_robot *robot, int64_t now_
     robot->frame_ms = said_ms;
     robot->silent = now_ms - said_ms >= BASE_SILENCE_MS;
     if (robot->answered) {
+        robot->recalls = 0;
         robot->unframed = (struct base_unframed){0};
         whisker_base_robot_log_back(robot);
     }
@@ -336,6 +340,13 @@ void base_robot_change_commander(struct base_robot *robot, bool taken, int64_t n
     }
 }
 
+/* What comes has neither frames nor text in it. */
+static bool whisker_base_robot_astray(const struct base_unframed *unframed)
+{
+    return unframed->all > 0 && unframed->own == 0 && unframed->other == 0 && 2 * unframed->text <= unframed->all &&
+           2 * unframed->boot <= unframed->all;
+}
+
 /* Why nothing is heard, by what has come since. */
 static const char *whisker_base_robot_cause(const struct base_unframed *unframed)
 {
@@ -356,7 +367,9 @@ static void whisker_base_robot_log_silence(struct base_robot *robot, const struc
 {
     if (robot->reported_ms == 0 || now_ms - robot->reported_ms >= BASE_TELL_MS) {
         robot->reported_ms = now_ms;
-        base_log(&robot->log.silence, LOG_WARN, "%s: no frame for %d ms: %s; ordered to stop, asked again every %d ms",
+        base_log(&robot->log.silence, LOG_WARN,
+                 "%s: no frame for %d ms: %s; ordered to stop, but the wheels may turn; asked "
+                 "again every %d ms",
                  robot->options->port, BASE_SILENCE_MS, whisker_base_robot_cause(unframed), BASE_SILENCE_MS);
     }
 }
@@ -407,6 +420,10 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
     if (now_ms - whisker_base_robot_heard_ms(robot) >= BASE_SILENCE_MS) {
         whisker_base_robot_restart_stream(robot, now_ms);
     }
+    if (robot->silent && !robot->recalled && now_ms - robot->opened_ms >= ANSWER_MS &&
+        whisker_base_robot_astray(&robot->unframed)) {
+        base_recall(robot, now_ms);
+    }
     const int64_t silence_ms = whisker_base_robot_heard_ms(robot) + BASE_SILENCE_MS - now_ms;
     const int64_t commander_ms =
         whisker_base_robot_moving(robot) ? robot->drive_ms + BASE_COMMANDER_MS - now_ms : silence_ms;
@@ -417,6 +434,7 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
 bool base_robot_end(struct base_robot *robot, int64_t now_ms)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES];
+    base_recall_end(robot);
     robot->may_turn = true;
     const bool stopped = base_robot_stop(robot, now_ms);
     if (stopped) {

@@ -72,6 +72,12 @@ int32_t base_robot_mode_reported(const struct base_robot *robot);
 void base_request(struct base_robot *robot, int64_t now_ms);
 void base_request_soon(struct base_robot *robot, int64_t now_ms);
 
+/* Orders the base to stand and to go at the port's speed again, at another speed, which is the port's until the
+ * recall ends, at the next request at the latest; other orders wait for that. An order to the wheels that was altered
+ * in one bit is one to the base's line: it goes at 300 or 600 baud then, and hears no stop. */
+void base_recall(struct base_robot *robot, int64_t now_ms);
+void base_recall_end(struct base_robot *robot);
+
 /* Requests what is due. Returns ms until it is; `idle_ms`: nothing is. */
 int64_t base_request_due(struct base_robot *robot, int64_t now_ms, int64_t idle_ms);
 

@@ -1,5 +1,8 @@
 /* What is known of the base, frame by frame: its mode, whether it heard its orders, its battery; and so whether its
  * wheels are kept stopped. Nothing is known of a base that is not heard. */
+#include <string.h>
+
+#include "create/port.h"
 #include "daemon_log.h"
 #include "whisker_base_orders.h"
 #include "whisker_base_robot.h"
@@ -65,6 +68,10 @@ static const char *whisker_base_state_mode_reason(const struct base_robot *robot
 
 /* Between two requests that clients cause: each is ten times an order to the wheels. */
 #define REQUEST_PACE_MS 100
+/* Zero bytes that end half an order to the wheels; with them a recall takes 367 ms at 300 baud, and the base waits for
+ * CREATE_OI_BAUD_WAIT_MS before it goes by it. */
+#define ORDER_LACKS 4
+#define RECALL_MS 500
 static const uint8_t packets[] = {
     CREATE_OI_BUMPS_DROPS,
     CREATE_OI_CLIFF_LEFT,
@@ -115,9 +122,33 @@ static void whisker_base_state_expect(struct base_robot *robot, const uint8_t *i
     robot->answered = robot->request_due = false;
 }
 
+void base_recall(struct base_robot *robot, int64_t now_ms)
+{
+    static const uint32_t bauds[] = {300, 600, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200};
+    uint8_t bytes[CREATE_COMMAND_BYTES];
+    const uint32_t baud = bauds[robot->recalls++ % (sizeof bauds / sizeof bauds[0])];
+    if (baud == robot->options->baud || !create_port_set_baud(robot->port, baud)) {
+        return;
+    }
+    size_t count = ORDER_LACKS;
+    memset(bytes, 0, count);
+    count += create_put_drive_direct(bytes + count, 0, 0);
+    count += create_put_baud(bytes + count, robot->options->baud);
+    robot->cut_count = 0;
+    base_orders_write(robot, bytes, count);
+    robot->recalled = robot->port >= 0;
+    robot->opened_ms = now_ms + RECALL_MS - BASE_SILENCE_MS;
+}
+
+void base_recall_end(struct base_robot *robot)
+{
+    robot->recalled = robot->recalled && !create_port_set_baud(robot->port, robot->options->baud);
+}
+
 void base_request(struct base_robot *robot, int64_t now_ms)
 {
     uint8_t bytes[CREATE_COMMAND_BYTES], ids[sizeof packets];
+    base_recall_end(robot);
     robot->requests++;
     robot->unheard_requests++;
     const size_t count = whisker_base_state_order_packets(robot, ids);
@@ -140,7 +171,7 @@ void base_request_soon(struct base_robot *robot, int64_t now_ms)
 
 int64_t base_request_due(struct base_robot *robot, int64_t now_ms, int64_t idle_ms)
 {
-    const int64_t due_ms = robot->opened_ms + REQUEST_PACE_MS - now_ms;
+    const int64_t due_ms = robot->opened_ms + (robot->recalled ? BASE_SILENCE_MS : REQUEST_PACE_MS) - now_ms;
     if (robot->request_due && (due_ms <= 0 || robot->options->stream_clock)) {
         base_request(robot, now_ms);
     }

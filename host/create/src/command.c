@@ -55,6 +55,15 @@ size_t create_put_stream(uint8_t *bytes, const uint8_t *ids, size_t count)
     return count + 2;
 }
 
+size_t create_put_baud(uint8_t *bytes, uint32_t baud)
+{
+#define CODE(code, speed) baud == (speed) ? (code):
+    bytes[0] = CREATE_OI_OP_BAUD;
+    bytes[1] = CREATE_OI_BAUDS(CODE) UINT8_MAX;
+#undef CODE
+    return 2;
+}
+
 size_t create_put_pause(uint8_t *bytes)
 {
     bytes[0] = CREATE_OI_OP_STREAM_STATE;

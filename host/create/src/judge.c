@@ -6,6 +6,8 @@
 /* A base that is pushed goes no faster than a person in haste, for as long as nobody notices that it is not heard. */
 #define PUSHED_M_S 2.0
 #define PUSHED_MOST_S 0.5
+/* Few are pushed in a moment that is not heard; the fastest push is not beyond belief: so many sigma. */
+#define PUSHED_SIGMAS 8
 
 double create_wheel_way(const struct create_reach *reach, double distance, double angle)
 {
@@ -15,6 +17,11 @@ double create_wheel_way(const struct create_reach *reach, double distance, doubl
 double create_driven_most(const struct create_reach *reach, double time_s)
 {
     return DRIVEN * reach->speed_m_s * time_s;
+}
+
+double create_pushed_unseen(double time_s)
+{
+    return PUSHED_M_S / PUSHED_SIGMAS * fmin(time_s, PUSHED_MOST_S);
 }
 
 enum create_verdict create_judge(const struct create_reach *reach, double distance, double angle, double asked_m_s,

@@ -210,12 +210,14 @@ static void odometry_add_estimate(struct create_odometry *odometry, struct creat
                                                        odometry_asked_distance(frame), orders->distance, orders->way);
     const struct estimate angle = odometry_estimate(odometry, frame, odometry->asked_rad,
                                                     odometry_asked_angle(odometry, frame), orders->angle, orders->turn);
+    const double pushed_m = odometry_counts_encoders(&odometry->settings) ? 0 : create_pushed_unseen(frames * PERIOD_S);
     odometry->missed_m = distance.motion;
     odometry->missed_rad = angle.motion;
     step->distance += frames * distance.motion;
     step->angle += frames * angle.motion;
-    step->loose_distance = hypot(step->loose_distance, frames * distance.sigma);
-    step->loose_angle = hypot(step->loose_angle, frames * angle.sigma);
+    step->loose_distance = hypot(step->loose_distance, hypot(frames * distance.sigma, pushed_m));
+    step->loose_angle =
+        hypot(step->loose_angle, hypot(frames * angle.sigma, pushed_m / odometry->settings.wheel_base_m));
     odometry->estimated += (uint64_t)frames;
 }
 

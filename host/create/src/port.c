@@ -32,10 +32,11 @@ bool create_port_knows(uint32_t baud)
     return port_find_speed(baud, &speed);
 }
 
-static bool port_make_raw(int port, speed_t speed)
+bool create_port_set_baud(int port, uint32_t baud)
 {
     struct termios line;
-    if (tcgetattr(port, &line) != 0) {
+    speed_t speed;
+    if (!port_find_speed(baud, &speed) || tcgetattr(port, &line) != 0) {
         return false;
     }
     cfmakeraw(&line);
@@ -48,14 +49,13 @@ static bool port_make_raw(int port, speed_t speed)
 
 int create_port_open(const char *path, uint32_t baud)
 {
-    speed_t speed;
-    if (!port_find_speed(baud, &speed)) {
+    if (!create_port_knows(baud)) {
         errno = EINVAL;
         return -1;
     }
     const int port = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (port >= 0 &&
-        (flock(port, LOCK_EX | LOCK_NB) != 0 || !port_make_raw(port, speed) || ioctl(port, TIOCEXCL) != 0)) {
+        (flock(port, LOCK_EX | LOCK_NB) != 0 || !create_port_set_baud(port, baud) || ioctl(port, TIOCEXCL) != 0)) {
         const int error = errno;
         close(port);
         errno = error;

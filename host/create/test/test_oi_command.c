@@ -31,6 +31,7 @@ static void orders_are_those_of_the_manual(void **state)
     assert_bytes(create_put_drive_direct(bytes, 500, -500), 145, 1, 244, 254, 12); /* right first */
     assert_bytes(create_put_stream(bytes, (const uint8_t[]){29, 13}, 2), 148, 2, 29, 13);
     assert_bytes(create_put_pause(bytes), 150, 0);
+    assert_bytes(create_put_baud(bytes, 57600), 129, 10);
     assert_bytes(create_put_opcode(bytes, CREATE_OI_OP_START), 128);
     assert_bytes(create_put_opcode(bytes, CREATE_OI_OP_SAFE), 131);
     assert_bytes(create_put_opcode(bytes, CREATE_OI_OP_FULL), 132);

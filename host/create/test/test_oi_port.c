@@ -71,6 +71,10 @@ static void the_baud_is_set(void **state)
     assert_int_equal(tcgetattr(port, &line), 0);
     assert_int_equal(cfgetispeed(&line), B115200);
     assert_int_equal(cfgetospeed(&line), B115200);
+    assert_true(create_port_set_baud(port, 300)); /* and set anew */
+    assert_int_equal(tcgetattr(port, &line), 0);
+    assert_int_equal(cfgetospeed(&line), B300);
+    assert_false(create_port_set_baud(port, 301));
     assert_true(create_port_knows(57600));
     assert_false(create_port_knows(57601));
     close(port);

@@ -53,7 +53,9 @@
 #define NEVER 8.0    /* sigma of place or heading: no disturbance of the line or of the wheels makes so much */
 #define GRAIN_M 5e-3 /* of the judgement; about a degree */
 #define GRAIN_RAD 0.02
-#define FAR_M 1.0       /* nor has a lie that wheels can have done ever led so far in a leg */
+#define FAR_M 1.0        /* nor has a lie that wheels can have done ever led so far in a leg */
+#define RECALLED_MS 2500 /* a base at 300 or 600 baud hears again: a silence, two calls and a request between */
+#define RECALLED_ANY_MS 11000
 #define HANDED_MS 500   /* within which a new commander has the driver's own mode */
 #define RESOLUTION 1e-3 /* m, rad: of the comparison; what is of second order in the errors is less */
 /* Of regions of 90 %, over at least ENOUGH disturbances. */
@@ -141,7 +143,7 @@ static bool measurable, disturbed, reported; /* since the odometry was measured 
 static int64_t turned_ms, leg_from_ms;
 static unsigned measured[2], within[2], measured_clean, within_clean;
 
-static int64_t mode_wrong_ms, wheels_wrong_ms, lied_ms, stray_ms;
+static int64_t mode_wrong_ms, wheels_wrong_ms, lied_ms, stray_ms, deafened_ms;
 static char why[300];
 static char logged[4000];
 
@@ -161,6 +163,7 @@ ssize_t __wrap_read(int fd, void *bytes, size_t room);
 int __wrap_close(int fd);
 int __wrap_ioctl(int fd, unsigned long request, void *argument);
 int __wrap_tcflush(int fd, int queue);
+bool __wrap_create_port_set_baud(int fd, uint32_t baud);
 
 ssize_t __wrap_write(int fd, const void *bytes, size_t count)
 {
@@ -224,6 +227,13 @@ int __wrap_tcflush(int fd, int queue)
     return 0;
 }
 
+bool __wrap_create_port_set_baud(int fd, uint32_t baud)
+{
+    __wrap_tcflush(fd, TCIOFLUSH);
+    sim_create_host_baud(create, baud);
+    return plugged;
+}
+
 void daemon_log(enum daemon_priority priority, const char *format, ...)
 {
     char line[400];
@@ -284,11 +294,25 @@ static const char *health_of(const char *key)
     return found;
 }
 
-/* A base whose line has another speed, by an order that was spoilt, hears no order any more. The emulator still gives
- * it bytes, later and cut anywhere: no line does. */
+/* A base whose line has another speed, by an order that was spoilt, hears no order until it is called at that speed. */
 static bool deafened(void)
 {
-    return sim_create_baud(create) != create_model_facts(options.odometry.model)->baud;
+    return sim_create_baud(create) != options.baud;
+}
+
+/* It is called at each speed in turn, the likeliest first. */
+static void judge_recall(void)
+{
+    static const unsigned likely = 600;
+    const unsigned baud = sim_create_baud(create);
+    const bool unbroken = now_ms > to_robot_ms && now_ms > to_host_ms && now_ms > driver_ms && plugged;
+    deafened_ms = deafened() && unbroken ? deafened_ms : now_ms;
+    if (now_ms - deafened_ms > (baud <= likely ? RECALLED_MS : RECALLED_ANY_MS)) {
+        blame("the base is left at %u baud", baud);
+    }
+    if (deafened() && now_ms - heard_ms > BELIEVED_MS && strcmp(health_of("orders"), "unknown")) {
+        blame("the base is at %u baud, and its orders are said to be %s", baud, health_of("orders"));
+    }
 }
 
 /* No stop can come through, or nobody is there to write one. */
@@ -527,6 +551,7 @@ static void begin_fault(const struct fault *fault)
         end_driver();
         changed = false;
         handed_ms = 0;
+        sim_create_host_baud(create, options.baud);
         create_port_stop(PORT); /* the guard's */
         begin_driver(robot.port < 0 ? -1 : PORT);
         break;
@@ -708,12 +733,14 @@ static void drive_on(void)
     if (during(HICCUP)) {
         hung_ms++;
         if (hung_ms == 200) {
+            sim_create_host_baud(create, options.baud);
             create_port_stop(PORT); /* the guard's */
         }
         return;
     }
     hung_ms = 0;
     if (robot.port < 0 && plugged && now_ms % BASE_REOPEN_MS == 0) {
+        sim_create_host_baud(create, options.baud);
         base_robot_open(&robot, PORT, now_ms);
         opened_ms = now_ms;
     }
@@ -827,6 +854,7 @@ static void begin_draw(uint64_t number)
     create = sim_create_new(&their);
     options = (struct base_options){.port = "port", .full = whole(6) == 0};
     create_odometry_defaults(&options.odometry, model ? CREATE_2 : CREATE_1);
+    options.baud = create_model_facts(options.odometry.model)->baud;
     now_ms = BEGIN_MS;
     rx_count = 0;
     plugged = measurable = true;
@@ -835,6 +863,7 @@ static void begin_draw(uint64_t number)
     spoilt_orders = 0;
     heard_ms = to_robot_ms = to_host_ms = driver_ms = order_ms = ordered_ms = 0;
     mode_wrong_ms = wheels_wrong_ms = lied_ms = stray_ms = 0;
+    deafened_ms = now_ms;
     active = 0;
     changed = reported = false;
     handed_ms = left_ms = 0;
@@ -849,6 +878,7 @@ static void begin_draw(uint64_t number)
     drift = options.odometry.drift_rad_per_m * sim_rng_normal(&rng);
     why[0] = logged[0] = '\0';
     draw_faults();
+    sim_create_host_baud(create, options.baud);
     begin_driver(PORT);
     frame_count = 0;
 }
@@ -877,6 +907,7 @@ static void run_draw(uint64_t number)
         drive_on();
         look_at_wheels();
         judge_stops();
+        judge_recall();
         if (now_ms % 5 == 0) {
             judge_mode();
             judge_wheels();
@@ -910,6 +941,41 @@ static bool stays_awake(bool wire)
     end_driver();
     sim_create_free(create);
     return heard;
+}
+
+/* One bit of an order to the wheels is altered, and makes it one to the line: whether the base stands soon after the
+ * silence is seen, and is heard again. */
+static bool is_recalled(uint64_t number, double speed_m_s)
+{
+    enum { FLIPPED_MS = 500, STOPPED_MS = 2000, AGAIN_MS = 4000 };
+    static const int32_t apart = CREATE_OI_OP_DRIVE_DIRECT ^ CREATE_OI_OP_BAUD;
+    char text[80];
+    bool changed_baud = false, stopped = false;
+    begin_draw(number);
+    fault_count = 0;
+    snprintf(text, sizeof text, "drive %g 0", speed_m_s);
+    for (const int64_t begin_ms = now_ms; now_ms < begin_ms + AGAIN_MS; now_ms++) {
+        const struct sim_create_fault flip = {SIM_CREATE_FLIP_ORDER, sim_create_where(create).received, 1, apart, 0};
+        if (now_ms == begin_ms + FLIPPED_MS) {
+            sim_create_add_fault(create, &flip);
+        }
+        for (int i = 0; i < MS_TICKS; i++) {
+            sim_create_tick(create, &counted);
+        }
+        receive();
+        if (now_ms % 100 == 0) {
+            order(0, text);
+        }
+        base_robot_read(&robot, UINT64_MAX, now_ms);
+        base_robot_watch(&robot, now_ms);
+        look_at_wheels();
+        changed_baud |= deafened();
+        stopped |= changed_baud && now_ms < begin_ms + STOPPED_MS && !turning();
+    }
+    const bool again = base_robot_heard(&robot) && !deafened();
+    end_driver();
+    sim_create_free(create);
+    return changed_baud && stopped && again;
 }
 
 static void print_failure(uint64_t number)
@@ -965,6 +1031,13 @@ int main(int argc, char **argv)
     if (stays_awake(false) || !stays_awake(true)) {
         puts("a base sleeps after five minutes of rest, unless its pin is pulsed: not so");
         return 1;
+    }
+    for (uint64_t number = 0; number < 8; number++) {
+        if (!is_recalled(number, 0.2) || !is_recalled(number, 0.4)) {
+            printf("draw %llu: a base at another speed of its line is called back: not so\n%s",
+                   (unsigned long long)number, logged);
+            return 1;
+        }
     }
     for (uint64_t number = read_journal(journal, first); number < end; number++) {
         run_draw(number);

@@ -49,6 +49,9 @@ size_t create_put_opcode(uint8_t *bytes, enum create_oi_opcode opcode);
 /* Opcode 148: a stream of these packets, at most CREATE_COMMAND_BYTES - 2. */
 size_t create_put_stream(uint8_t *bytes, const uint8_t *ids, size_t count);
 
+/* Opcode 129: the base's line at one of the interface's speeds, CREATE_OI_BAUD_WAIT_MS later. */
+size_t create_put_baud(uint8_t *bytes, uint32_t baud);
+
 /* Opcode 150: pauses the stream. */
 size_t create_put_pause(uint8_t *bytes);
 

@@ -28,6 +28,9 @@ double create_wheel_way(const struct create_reach *reach, double distance, doubl
 
 /* The furthest that a wheel can drive, m. */
 double create_driven_most(const struct create_reach *reach, double time_s);
+
+/* Standard deviation of what a base without encoders was pushed while nobody heard it, m. */
+double create_pushed_unseen(double time_s);
 /* cffi: end */
 
 #pragma GCC visibility pop
