@@ -73,7 +73,7 @@ static const struct command_line LINE = {
         "Loads a firmware image (.whex) into all nodes of a bridge at once and starts it. Stop whiskerd first.\n"
         "A gateware image (.wgw) goes into the bridge itself; of the options it takes --dry-run, --force, --bridge.\n",
     .notes = "Example: whisker-flash examples/node.whex\n"
-             "Exit code: 0 every node has it, 1 failed for some or all, 2 wrong use.\n",
+             "Exit code: 0 every node has it, 1 failed for some or all, 2 wrong use, or a file that is no image.\n",
     .option = OPTIONS,
     .count = sizeof OPTIONS / sizeof *OPTIONS,
 };
@@ -101,7 +101,7 @@ static int whisker_flash_read_file(const char *path)
     FILE *file = fopen(path, "rb");
     if (!file) {
         fprintf(stderr, PROGRAM ": %s: cannot be read; check the name, or make it: make firmware\n", path);
-        return CLI_FAILED;
+        return CLI_USAGE;
     }
     image_count = fread(image_bytes, 1, sizeof image_bytes, file);
     fclose(file);
@@ -286,7 +286,8 @@ int main(int argc, char **argv)
     }
     int error = options.image ? whisker_image_parse(image_bytes, image_count, &image) : WHISKER_OK;
     if (error) {
-        return cli_fail(PROGRAM, options.image, error);
+        cli_fail(PROGRAM, options.image, error);
+        return CLI_USAGE;
     }
     error = whisker_device_open(options.bridge, &device, &identity);
     if (error) {

@@ -30,6 +30,10 @@ class CalibrationError(UserError):
     exit_code = 1
 
 
+class RestError(UserError):
+    """A rest.toml that is none; one line."""
+
+
 @dataclass(frozen=True)
 class Rest:
     """A lane untouched: mean and standard deviation of (alpha, beta), counts; samples good and bad."""
@@ -121,14 +125,14 @@ def write_rest(path: Path, rests: list[Rest], names: list[str]) -> None:
 
 
 def read_noise(path: Path) -> dict[int, np.ndarray]:
-    """Noise of (alpha, beta) by lane, from a rest.toml. CalibrationError: file, what, remedy."""
+    """Noise of (alpha, beta) by lane, from a rest.toml. RestError: file, what, remedy."""
     try:
         _, content = read_toml(path)
         lanes = {int(entry["lane"]): np.asarray(entry["noise"], float) for entry in content["lane"]}
         if any(noise.shape != (2,) or not (noise >= 0.0).all() for noise in lanes.values()):
             raise ValueError("noise is not two numbers")
     except (UnreadableError, KeyError, TypeError, ValueError) as error:
-        raise CalibrationError(f"{path}: {error}; give the rest.toml that whisker calibrate wrote") from error
+        raise RestError(f"{path}: {error}; give the rest.toml that whisker calibrate wrote") from error
     return lanes
 
 

@@ -126,10 +126,10 @@ def test_a_bad_line_costs_frames_and_nothing_else(robot):
 
 
 def test_a_cliff_makes_it_passive_until_the_commander_goes_on(robot):
-    it = robot("--event", "cliff-front-left@0.6+1000")
+    it = robot("--event", "cliff-front-left@0.6+1000", driver=FRAME_BY_FRAME)
     while it.wait_frame().bits & IDLE:
         pass
-    stopped = IDLE | CLIFF_FRONT_LEFT  # a stall of the machine alone makes it idle, too
+    stopped = IDLE | CLIFF_FRONT_LEFT
     it.drive_until(0.1, 0, lambda motions: motions and motions[-1].bits == stopped)
     assert it.wait_frame().bits == stopped
     assert it.base.health()["mode"] == "passive"
