@@ -124,7 +124,9 @@ static void whisker_base_state_expect(struct base_robot *robot, const uint8_t *i
 
 void base_recall(struct base_robot *robot, int64_t now_ms)
 {
-    static const uint32_t bauds[] = {300, 600, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200};
+#define BAUD(code, baud) baud,
+    static const uint32_t bauds[] = {CREATE_OI_BAUDS(BAUD)};
+#undef BAUD
     uint8_t bytes[CREATE_COMMAND_BYTES];
     const uint32_t baud = bauds[robot->recalls++ % (sizeof bauds / sizeof bauds[0])];
     if (baud == robot->options->baud || !create_port_set_baud(robot->port, baud)) {
