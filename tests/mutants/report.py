@@ -3,22 +3,14 @@
 Verdicts are given by a person, in verdicts.toml: `equivalent` with the reason why no test can notice the change.
 """
 
-import math
 import tomllib
 from collections import Counter
 from pathlib import Path
 
+from crunchbot_lab.report.share import wilson
+
 VERDICTS = Path(__file__).with_name("verdicts.toml")
 KEY = ("file", "text", "before", "after")  # of a verdict: `text` is the whole line, which outlives its number
-Z_95 = 1.96
-
-
-def wilson(killed: int, tried: int) -> tuple[float, float]:
-    """95 % interval of a share, by Wilson's score (E. B. Wilson, JASA 22, 1927)."""
-    share, spread = killed / tried, Z_95**2 / tried
-    middle = share + spread / 2
-    half = Z_95 * math.sqrt(share * (1 - share) / tried + spread / (4 * tried))
-    return (middle - half) / (1 + spread), (middle + half) / (1 + spread)
 
 
 def summarise(entries: list[dict], seed: int, commit: str) -> dict:

@@ -7,7 +7,9 @@ import pytest
 from mutants.__main__ import ROOT, draw
 from mutants.nearest import steps_for
 from mutants.operators import mutants_of
-from mutants.report import summarise, wilson
+from mutants.report import summarise
+
+from crunchbot_lab.report.share import wilson
 
 
 def changed(file: str, text: str) -> set[str]:

@@ -26,14 +26,16 @@ def placed(*lanes: str) -> str:
 
 def chain() -> str:
     found = read_result("chain_speed")
-    rows = [{"what": "whole chain to the pilot, SCK/6", "cycles_per_tick": None} | run for run in found["whole_chain"]]
-    rows += [{"what": f"bridge and nodes, {link}"} | run for link, runs in found["bridge"].items() for run in runs]
+    links = sorted(found["bridge"], key=lambda link: "hardware" not in link)  # the hardware's own settings first
+    rows = [{"what": f"bridge and nodes, {link}"} | run for link in links for run in found["bridge"][link]]
+    whole = {"what": "whole chain to the pilot, SCK/6", "cycles_per_tick": None}
+    rows += [whole | run for run in found["whole_chain"]]
     columns = {"what runs": "{what}", "lanes": "{lanes}", "cycles per tick": "{cycles_per_tick:.0f}"}
     return lined(rows, columns | {"times real time": "{realtime_factor:.2f}"})
 
 
 def levels() -> str:
-    found = read_result("levels")
+    found = dict(sorted(read_result("levels").items(), key=lambda row: ("rtl" in row[0], "hardware" not in row[0])))
     first, *others = found
     rows = []
     for runs in zip(*found.values(), strict=True):

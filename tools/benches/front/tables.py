@@ -3,20 +3,29 @@
 import json
 import tomllib
 
+from crunchbot_lab.report.share import wilson
+
 from ..store import CHARTS, COMMAND_OF_CHART, COMMAND_OF_RESULT, ORIGINS, RESULTS, ROOT, read_result
 from ..tables import cell, table
 
 HEADLINES = tomllib.loads((ROOT / "bench/headlines.toml").read_text())["figure"]
+TEXTURE_WINDOWS = 1920  # of the held-out drives of benches/texture/cost.py
 
 
 def fields(result: str) -> dict:
     """Of a result, for patterns; sums and choices that a pattern cannot make."""
     data = read_result(result)
     if result == "nav_families":
-        return data["families"]["all"] | {"families": len(data["draws"])}
+        found = data["families"]["all"]
+        low, high = wilson(found["locked"], found["draws"])
+        return found | {"families": len(data["draws"]), "low": low, "high": high}
     if result == "ring":
         polling = {"mode": "poll", "pace": "2khz", "readers": 1}
-        return {row["peer"]: row["latency_us"]["p50"] for row in data["rows"] if polling.items() <= row.items()}
+        rows = {row["peer"]: row["latency_us"] for row in data["rows"] if polling.items() <= row.items()}
+        return {peer: row["p50"] for peer, row in rows.items()} | {
+            "rounds": data["rounds"],
+            "slow": rows["whisker"]["p99"],
+        }
     if result == "usb_soak":
         return data | {"bad": sum(data[key] for key in ("gaps", "duplicates", "wrong", "stale"))}
     if result == "levels":
@@ -24,6 +33,12 @@ def fields(result: str) -> dict:
         runs = hardware[1]["runs"]
         spread = {"runs": len(runs), "low": min(runs), "high": max(runs)}
         return data | spread | {"hardware": hardware, "gateware": data["rtl, SCK/6, gap 0.5 us"]}
+    if result == "texture":
+        low, high = wilson(round(data["cost"]["default"]["error"] * TEXTURE_WINDOWS), TEXTURE_WINDOWS)
+        return data | {"windows": TEXTURE_WINDOWS, "low": low, "high": high}
+    if result == "nav_matrix":
+        low, _ = wilson(round(data["rows"]["global start"]["adaptive"]["near_at_end"] * data["seeds"]), data["seeds"])
+        return data | {"low": low}
     if result == "map":
         return data["families"]
     return data
