@@ -20,8 +20,8 @@ MISTAKES = {
     "whisker localise examples": ("examples/arena.toml: cannot be read", "a scene folder needs it"),
     "whisker localise examples/drive.mcap": ("no such folder", "give a scene folder"),
     "whisker localise examples/scene --filter kalman": ("filter 'kalman' is unknown", "choose one of odometry, "),
-    "whisker localise examples/scene --filter grid --set grid.cell_m=0": (
-        "outside 0.005 to 1",
+    "whisker localise examples/scene --filter grid --set grid.cell_m=2": (
+        "outside 0 to 1",
         "choose a value inside",
     ),
     "whisker localise examples/scene --filter grid --set cell=0.1": (

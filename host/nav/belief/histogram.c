@@ -25,8 +25,8 @@ struct nav_blur {
     float side_turn;                                     /* weight of a neighbour in the headings' */
 };
 
-/* How far it is: the group of the line of the slice that is stored next (-1: the line is not begun), of lines before
- * `end`; those before `made` are written out. */
+/* How far it is: the group of the line of the slice that is stored next, of lines before `end`; those before `made` are
+ * written out. */
 struct nav_progress {
     int slice, line, group, end, made;
     uint32_t groups; /* stored */
@@ -421,9 +421,6 @@ static const double PENDING_LEAST = 0.05;
 /* ... and no three-point kernel takes more than this (its middle weight stays at 1/2). */
 static const double KERNEL_MOST = 0.5;
 
-/* Lines passed over to write one out: its own, those of both neighbours, the blurred one. */
-enum { MAKE_MOST = 4 };
-
 double nav_histogram_fan(const struct nav_histogram *h, struct nav_pose step, double along_m)
 {
     double distance = hypot(step.x, step.y);
@@ -449,11 +446,6 @@ double nav_histogram_shift_x(const struct nav_histogram *h, int p)
 double nav_histogram_shift_y(const struct nav_histogram *h, int p)
 {
     return histogram_pass_cells(h)->shift_y[p];
-}
-
-bool nav_histogram_running(const struct nav_histogram *h)
-{
-    return h->pass->running;
 }
 
 double nav_histogram_debt(const struct nav_histogram *h)
@@ -507,10 +499,8 @@ static void histogram_pass_shift(struct nav_histogram *h, struct nav_pose step)
     h->next.rotation = nav_wrap(h->now.rotation + step.theta);
 }
 
-static void histogram_pass_begin_slice(struct nav_histogram *h);
-
-void nav_histogram_begin(struct nav_histogram *h, struct nav_pose step, const struct nav_weigh *weigh,
-                         struct nav_pose about)
+static void histogram_pass_begin(struct nav_histogram *h, struct nav_pose step, const struct nav_weigh *weigh,
+                                 struct nav_pose about)
 {
     struct nav_pass *p = h->pass;
     double side, side_turn;
@@ -526,10 +516,9 @@ void nav_histogram_begin(struct nav_histogram *h, struct nav_pose step, const st
     p->total = 0.0;
     p->cells = 0;
     p->heaviest = 0.0f;
-    p->at.slice = 0;
+    p->at.touched = 0;
     p->running = true;
     histogram_store_begin(h);
-    histogram_pass_begin_slice(h);
 }
 
 static struct nav_line *histogram_pass_blurred(const struct nav_histogram *h, int j)
@@ -665,7 +654,6 @@ static void histogram_pass_begin_slice(struct nav_histogram *h)
     histogram_pass_extent(h, extent);
     p->at.line = 0;
     p->at.end = extent[1];
-    p->at.group = -1;
     histogram_pass_skip(h, extent[0] < extent[1] ? extent[0] : h->shape.ny);
     for (int n = 0; n < NAV_BLUR_LINES && p->at.line < h->shape.ny; n++)
         histogram_line_clear(&p->blurred[n]);
@@ -689,18 +677,29 @@ static void histogram_pass_open(struct nav_histogram *h)
     p->groups_end = all.end;
 }
 
+/* What is added to a cell of the line. */
+static float histogram_pass_extra(const struct nav_histogram *h, int column)
+{
+    const struct nav_pass *p = h->pass;
+    if (!(p->weigh->extra > 0.0) || !p->weigh->prior)
+        return (float)p->weigh->extra;
+    double x = (column + 0.5) * h->shape.cell + nav_histogram_shift_x(h, p->at.slice);
+    double y = (p->at.line + 0.5) * h->shape.cell + nav_histogram_shift_y(h, p->at.slice);
+    return (float)(p->weigh->extra * p->weigh->prior(p->weigh->self, x, y));
+}
+
 /* Mass of a group before it is weighed. */
 static void histogram_pass_mass(const struct nav_histogram *h, int g, float *mass)
 {
     const struct nav_pass *p = h->pass;
-    float same = (float)(p->weigh->extra + (h->uniform ? 1.0 / nav_shape_inside(&h->shape) : 0.0));
+    float even = h->uniform ? (float)(1.0 / nav_shape_inside(&h->shape)) : 0.0f;
     nav_lanes sum = {0.0f};
     for (int t = 0; t <= 2 * p->blur.reach && !h->uniform; t++)
         sum += p->blur.across[t] * *(const nav_lanes *)(p->row[t] + g * NAV_LANES);
     int inside = h->shape.nx - g * NAV_LANES;
     float least = (float)p->weigh->least;
     for (int k = 0; k < NAV_LANES; k++) {
-        float all = sum[k] + (k < inside ? same : 0.0f);
+        float all = sum[k] + (k < inside ? even + histogram_pass_extra(h, g * NAV_LANES + k) : 0.0f);
         mass[k] = all >= least ? all : 0.0f;
     }
 }
@@ -781,27 +780,17 @@ static void histogram_pass_close(struct nav_histogram *h)
     histogram_pass_survey(h, h->next.first[number]);
     histogram_end_line(h, number);
     p->at.line++;
-    p->at.group = -1;
 }
 
-/* Does groups of the line in work; false: the next one would take more than `most`. */
-static bool histogram_pass_line(struct nav_histogram *h, long most)
+static void histogram_pass_line(struct nav_histogram *h)
 {
     struct nav_pass *p = h->pass;
-    long each = NAV_LANES + p->weigh->most;
-    for (; !h->uniform && p->at.made <= p->at.line + p->blur.reach; histogram_pass_make(h)) {
-        if (p->at.touched + MAKE_MOST * NAV_LANES * h->shape.groups > most)
-            return false;
-    }
-    if (p->at.group < 0)
-        histogram_pass_open(h);
-    for (; p->at.group < p->groups_end; p->at.group++) {
-        if (p->at.touched + each > most)
-            return false;
+    while (!h->uniform && p->at.made <= p->at.line + p->blur.reach)
+        histogram_pass_make(h);
+    histogram_pass_open(h);
+    for (; p->at.group < p->groups_end; p->at.group++)
         histogram_pass_group(h, p->at.group);
-    }
     histogram_pass_close(h);
-    return true;
 }
 
 static void histogram_pass_end(struct nav_histogram *h)
@@ -816,18 +805,17 @@ static void histogram_pass_end(struct nav_histogram *h)
     histogram_store_swap(h);
 }
 
-long nav_histogram_run(struct nav_histogram *h, long most)
+long nav_histogram_pass(struct nav_histogram *h, struct nav_pose step, const struct nav_weigh *weigh,
+                        struct nav_pose about)
 {
     struct nav_pass *p = h->pass;
-    p->at.touched = 0;
-    while (p->running && (p->at.line == h->shape.ny || histogram_pass_line(h, most))) {
-        if (p->at.line < p->at.end)
-            continue;
+    histogram_pass_begin(h, step, weigh, about);
+    for (p->at.slice = 0; p->at.slice < h->shape.nh; p->at.slice++) {
+        histogram_pass_begin_slice(h);
+        while (p->at.line < p->at.end)
+            histogram_pass_line(h);
         histogram_pass_skip(h, h->shape.ny);
-        if (++p->at.slice < h->shape.nh)
-            histogram_pass_begin_slice(h);
-        else
-            histogram_pass_end(h);
     }
+    histogram_pass_end(h);
     return p->at.touched;
 }

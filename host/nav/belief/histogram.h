@@ -3,8 +3,7 @@
  * Each heading slice keeps its own shift in x and y and all slices share one rotation, so that motion does not smear:
  * only whole-cell moves are left to the cells, and odometry noise is added by blurs of the variance asked for. Of every
  * line of cells those groups of NAV_LANES are stored that hold mass, in the order of slices, lines and columns. Moves,
- * blurs, the likelihood and the sums for normalising are one pass from one store to another, which
- * may be interrupted after every group.
+ * blurs, the likelihood and the sums for normalising are one pass from one store to another.
  *
  * Level n has cells 2^n times as wide as level 0: a belief can begin coarse and be refined when its mass sits in few
  * cells. */
@@ -21,8 +20,6 @@
 
 /* Cells of a group; and the sums of a slice: its mass and that times x, y, xx, xy, yy, relative to some place. */
 enum { NAV_LANES = NAV_CELLS_AHEAD, NAV_MOMENTS = 6 };
-
-#define NAV_LEVER_M 0.2 /* from the robot's middle to what a whisker meets, about: a turn moves that so far */
 
 /* Division of an arena into cells. */
 struct nav_shape {
@@ -62,10 +59,18 @@ struct nav_weigh {
      * what it took, in cells passed over. NULL: all are 1. */
     long (*group)(void *self, int slice, int line, int group, const float *mass, float *like);
     void *self;
-    long most;    /* that it can take */
     double least; /* cells with a smaller share are dropped before they are weighed */
-    double extra; /* belief added to each cell before that */
+    double extra; /* belief added to each cell before that, by the prior of its place; NULL: the same everywhere */
+    double (*prior)(void *self, double x, double y);
 };
+
+/* Rows whose hazard is given at once, since a pass that gives it visits every cell: a robot that was carried is looked
+ * for at most so much later. */
+enum { NAV_HAZARD_ROWS = 16 };
+
+/* A cell is dropped that holds less than this share of what a uniform belief gives each: it is below what a hazard of
+ * 1e-3 gives in so many rows. */
+#define NAV_SHARE_LEAST 0.01
 
 struct nav_pass;
 
@@ -117,15 +122,9 @@ bool nav_histogram_refine(struct nav_histogram *);
 /* Groups that hold mass. */
 uint32_t nav_histogram_groups(const struct nav_histogram *);
 
-/* Starts a pass: `step` in the robot's frame; pending noise is added as far as one pass can, whose share of a cell that
- * is left then stays pending. Sums will be relative to `about`. `weigh` must last as long as the pass. */
-void nav_histogram_begin(struct nav_histogram *, struct nav_pose step, const struct nav_weigh *, struct nav_pose about);
-
-/* Goes on with it for at most `most` cells passed over: how many it were. */
-long nav_histogram_run(struct nav_histogram *, long most);
-
-/* Whether a pass is under way. Until it ends the belief is that from before it. */
-bool nav_histogram_running(const struct nav_histogram *);
+/* One pass: `step` in the robot's frame; pending noise is added as far as one pass can, whose share of a cell that is
+ * left then stays pending. Sums will be relative to `about`. Returns how many cells were passed over. */
+long nav_histogram_pass(struct nav_histogram *, struct nav_pose step, const struct nav_weigh *, struct nav_pose about);
 
 /* Pending variance that one pass cannot add, in passes. */
 double nav_histogram_debt(const struct nav_histogram *);

@@ -4,8 +4,7 @@
  * rows as well. In doubt: an arena-wide histogram starts and takes the rows since which the robot may have been
  * kidnapped; the filter keeps both beliefs, weighted by how well they explained those rows. Pose unknown: the histogram
  * alone, until its mass lies in few enough cells for a cloud. While there are several modes it stays active beside the
- * cloud and sets their weights. Work per row is bounded by adaptive.budget in every state: what the histogram has not
- * done waits for the next row. docs/methods/localisation.md describes it. */
+ * cloud and sets their weights. docs/methods/localisation.md describes it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -49,7 +48,6 @@ struct adaptive {
     double odds; /* logarithm, kidnapped against local, before the rows that the histogram has gone over */
     struct nav_pending pending; /* since the last row that was read ... */
     bool pending_unknown;       /* ... and whether some of it was not reported */
-    bool idle;                  /* nothing was read in the row before */
     struct nav_pose answer;     /* after the last row that was read */
     long evaluations, distinct, touched;
 };
@@ -70,7 +68,7 @@ static void adaptive_destroy(void *self)
 /* Log-odds that the robot is not where the local belief has it. */
 static double adaptive_log_odds(const struct adaptive *a)
 {
-    double hazard = log(a->problem->settings.adaptive.hazard);
+    double hazard = log(nav_problem_hazard(a->problem));
     if (!a->local)
         return INFINITY;
     bool searched = a->awake && !a->whole;
@@ -159,8 +157,8 @@ static int adaptive_init_cloud(struct adaptive *a)
     cloud->sample.least = (long)fmin(s->adaptive.least, a->global.room);
     nav_rng_seed(&cloud->rng, a->problem->seed, 0);
     return nav_particles_init(&cloud->set, cloud->sample.most, true, s->adaptive.gain) ||
-                   nav_bins_init(&cloud->bins, cloud->sample.most, s->adaptive.bin_m,
-                                 s->adaptive.bin_deg * NAV_PI / 180.0)
+                   nav_bins_init(&cloud->bins, cloud->sample.most, a->global.cell.edge / 2.0,
+                                 a->global.cell.heading / 2.0)
                ? -1
                : 0;
 }
@@ -192,7 +190,7 @@ static void adaptive_start_search(struct adaptive *a)
     a->modes = a->whole ? a->modes : 0;
     a->whole = false;
     adaptive_kidnap_teach(&a->kidnap, a->likelihood, a->global.likelihood);
-    a->odds = log(a->problem->settings.adaptive.hazard);
+    a->odds = log(nav_problem_hazard(a->problem));
     adaptive_global_restart(&a->global, a->kidnap.since > reach ? a->kidnap.since : reach);
 }
 
@@ -347,29 +345,14 @@ static void adaptive_decide(struct adaptive *a)
         adaptive_end_search(a, present);
 }
 
-/* Lets the histogram work within what is left of the row's budget. */
 static void adaptive_search(struct adaptive *a)
 {
     if (!a->awake)
         return;
-    a->global.touched = a->global.distinct = 0;
-    /* Kept back: a cloud drawn from what is found, and that it is moved, weighed and thinned when the row comes. */
-    const long drawn = 2, taken = 3; /* poses looked at for each of the cloud's */
-    long kept = (a->idle ? drawn + taken : drawn) * (long)a->global.room;
-    adaptive_global_work(&a->global, &a->log, (long)a->global.budget - kept - a->touched);
+    adaptive_global_work(&a->global, &a->log, a->local ? 0.0 : nav_problem_hazard(a->problem));
     a->touched += a->global.touched;
     a->evaluations += a->global.touched;
     a->distinct += a->global.distinct;
-}
-
-/* A row in which nothing was read leaves its time to those that wait. */
-static void adaptive_catch_up(struct adaptive *a)
-{
-    if (!a->idle || !a->awake || adaptive_global_current(&a->global, &a->log))
-        return;
-    adaptive_search(a);
-    adaptive_decide(a);
-    adaptive_sum_up(a);
 }
 
 /* NAV_CARRIED of the belief is anywhere from here on: the histogram begins anew beside what is held locally. */
@@ -388,8 +371,6 @@ static void adaptive_predict(void *self, const struct nav_motion *motion)
 {
     struct adaptive *a = self;
     a->evaluations = a->distinct = a->touched = 0;
-    adaptive_catch_up(a);
-    a->idle = true;
     struct nav_noise noise = nav_motion_noise(&a->problem->robot, &a->problem->settings, motion);
     nav_pending_add(&a->pending, motion->step, noise);
     a->pending_unknown = a->pending_unknown || motion->unknown_m > 0.0 || motion->unknown_rad > 0.0;
@@ -460,8 +441,9 @@ static void adaptive_update_local(struct adaptive *a, const struct nav_evidence 
 static void adaptive_hand_over(struct adaptive *a)
 {
     const struct nav_settings *s = &a->problem->settings;
-    double across = 1.0 + 4.0 * sqrt(a->pending.noise.position) / s->adaptive.bin_m; /* bins in 4 deviations */
-    double turned = 1.0 + 4.0 * sqrt(a->pending.noise.heading) * 180.0 / NAV_PI / s->adaptive.bin_deg;
+    const struct nav_bins *bins = &a->cloud.bins; /* in 4 deviations: */
+    double across = 1.0 + 4.0 * sqrt(a->pending.noise.position) / bins->edge;
+    double turned = 1.0 + 4.0 * sqrt(a->pending.noise.heading) * bins->turns / (2.0 * NAV_PI);
     if (!a->pending_unknown || !a->local || (a->awake && !a->whole) ||
         across * across * turned * s->adaptive.per_bin <= a->global.room)
         return;
@@ -477,7 +459,6 @@ static void adaptive_hand_over(struct adaptive *a)
 static void adaptive_update(void *self, const struct nav_evidence *evidence)
 {
     struct adaptive *a = self;
-    a->idle = false;
     adaptive_hand_over(a);
     nav_likelihood_read(a->likelihood, evidence);
     adaptive_log_write(&a->log, a->pending.step, a->pending.noise, evidence);

@@ -1,7 +1,6 @@
 /* Rows of the log on their way into the arena-wide belief, a job at a time. */
 #include "adaptive_global.h"
 
-#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,12 +15,9 @@ static const double JOBS_OWED_MOST = 16.0;
  * sometimes. */
 static const double BLOCKED = 1e-3;
 
-/* A cell is dropped that holds less than this share of what a uniform belief gives each. */
-static const double SHARE_LEAST = 0.01;
-
-/* A job's rows read, its motion planned and its answer found take as long as passing over about so many cells; what one
- * pose expects as many as ... */
-enum { JOB_CELLS = 10000, EXPECT_CELLS = 20 };
+/* Cells passed over in a row, at 10 ns each: no further job begins beyond them, so that a row takes 10 ms at most where
+ * a pass over the whole arena takes no longer. What one pose expects takes as long as passing over so many. */
+enum { ROW_CELLS = 500000, EXPECT_CELLS = 20 };
 
 /* Poses that stand for a cell: per edge, and per heading. */
 enum { SUB = 2, TURNS = 1 };
@@ -29,16 +25,15 @@ enum { SUB = 2, TURNS = 1 };
 /* Cells that a belief may have after it has been refined. */
 enum { REFINED_MOST = 8192 };
 
-/* A heading's cell may move the farthest sensor by this share of a cell's edge. */
-static const double TURN_SHARE = 2.0 / 3.0;
-static const double DEGREES_LEAST = 2.0, DEGREES_MOST = 24.0;
+/* Widest heading of a coarse level. */
+static const double HEADING_MOST = 24.0 * NAV_PI / 180.0;
 
 /* The table of what the first level's cells expect takes memory and set-up: cells that it may have at most. */
 static const double CELLS_MOST = 1.3e6;
 
 bool adaptive_global_current(const struct adaptive_global *g, const struct adaptive_log *log)
 {
-    return g->next == log->head && g->job.phase == ADAPTIVE_IDLE;
+    return g->next == log->head;
 }
 
 /* Adds one row's tables to the factors, as logarithms, and what the local belief made of it. */
@@ -62,10 +57,10 @@ static void global_move_row(struct adaptive_global *g, const struct adaptive_ent
     g->histogram.pending_heading += entry->noise.heading;
 }
 
-/* How far the whiskers have gone in a step, m. */
-static double global_path(struct nav_pose step)
+/* How far the sensor of the finest detail has gone in a step, m. */
+static double global_path(const struct adaptive_global *g, struct nav_pose step)
 {
-    return hypot(step.x, step.y) + NAV_LEVER_M * fabs(step.theta);
+    return hypot(step.x, step.y) + g->cell.lever * fabs(step.theta);
 }
 
 /* Rows between which nothing is read while the belief is too wide to keep up: the further behind, the longer the way.
@@ -75,7 +70,7 @@ static uint64_t global_skip(struct adaptive_global *g, struct adaptive_log *log)
     double late = (double)(log->head - g->next) / ADAPTIVE_ROWS_LATE - 1.0, cell = g->histogram.shape.cell;
     uint64_t row = g->next, reach = adaptive_log_reach(log);
     while (row < reach ||
-           (global_path(g->job.step) < late * cell && row + 1 < log->head && !adaptive_log_entry(log, row)->sharp))
+           (global_path(g, g->job.step) < late * cell && row + 1 < log->head && !adaptive_log_entry(log, row)->sharp))
         global_move_row(g, adaptive_log_entry(log, row++));
     return row;
 }
@@ -91,7 +86,7 @@ static void global_gather(struct adaptive_global *g, struct adaptive_log *log)
     for (row++; row < log->head && !sharp; row++) {
         const struct adaptive_entry *entry = adaptive_log_entry(log, row);
         since = (struct nav_pose){since.x + entry->step.x, since.y + entry->step.y, since.theta + entry->step.theta};
-        if (entry->sharp || global_path(since) > g->histogram.levels.cell)
+        if (entry->sharp || global_path(g, since) > g->histogram.levels.cell)
             break;
         global_move_row(g, entry);
         global_read_row(g, log, row);
@@ -116,8 +111,7 @@ static void global_read_job(struct adaptive_global *g, struct adaptive_log *log)
 {
     for (int w = 0; w < g->likelihood->whiskers; w++)
         memset(g->factor[w], 0, (size_t)g->likelihood->model[w].codes * sizeof **g->factor);
-    g->job = (struct adaptive_job){.phase = ADAPTIVE_PASS,
-                                   .pending = {g->histogram.pending_position, g->histogram.pending_heading}};
+    g->job = (struct adaptive_job){.end = g->next};
     global_gather(g, log);
 }
 
@@ -174,7 +168,22 @@ static long global_work_out(void *self, int p, int line, int group, const float 
     return EXPECT_CELLS * poses;
 }
 
-static void global_begin(struct adaptive_global *g, struct adaptive_log *log)
+/* What every cell is given of the chance that the robot was put there; finer cells than the first are not all held. */
+static double global_hazard(struct adaptive_global *g, double hazard)
+{
+    double rows = (double)(g->job.end - g->hazarded);
+    if (!(hazard > 0.0) || rows < NAV_HAZARD_ROWS || g->histogram.uniform || g->histogram.level != g->first.level)
+        return 0.0;
+    g->hazarded = g->job.end;
+    return fmin(rows, NAV_HAZARD_ROWS) * hazard / nav_shape_inside(&g->histogram.shape);
+}
+
+static double global_prior(void *self, double x, double y)
+{
+    return nav_likelihood_prior(((struct adaptive_global *)self)->likelihood, x, y);
+}
+
+static void global_pass(struct adaptive_global *g, struct adaptive_log *log, double hazard)
 {
     struct nav_histogram *h = &g->histogram;
     global_read_job(g, log);
@@ -191,9 +200,10 @@ static void global_begin(struct adaptive_global *g, struct adaptive_log *log)
         nav_expected_begin(g->expected, (const float *const *)g->factor, (float)(BLOCKED * exp(-g->job.reference)));
     g->weigh = (struct nav_weigh){.group = first ? global_look_up : global_work_out,
                                   .self = g,
-                                  .most = NAV_LANES * (first ? 1 : EXPECT_CELLS * SUB * SUB * TURNS),
-                                  .least = SHARE_LEAST / g->first.cells};
-    nav_histogram_begin(h, g->job.step, &g->weigh, nav_compose(g->summary.mean, g->job.step));
+                                  .least = NAV_SHARE_LEAST / g->first.cells,
+                                  .extra = global_hazard(g, hazard),
+                                  .prior = global_prior};
+    g->touched += nav_histogram_pass(h, g->job.step, &g->weigh, nav_compose(g->summary.mean, g->job.step));
 }
 
 /* The belief is that after the job's rows; a row that fits nowhere, or that lost all mass beyond the walls, leaves
@@ -208,85 +218,52 @@ static void global_end(struct adaptive_global *g)
         adaptive_global_restart(g, next);
         return;
     }
-    g->job.phase = ADAPTIVE_IDLE;
     g->gained += gain;
     g->next = next;
     g->summary.mass = nav_histogram_mode(&g->histogram, &g->summary.mean);
 }
 
-/* Counts cells worth a hypothesis, for at most `most` cells passed over. */
-static bool global_count(struct adaptive_global *g, long most)
+/* Counts cells worth a hypothesis. */
+static void global_count(struct adaptive_global *g)
 {
     const struct nav_histogram *h = &g->histogram;
     float worth = (float)(h->total / g->room);
-    for (; g->job.counted < nav_histogram_groups(h); g->job.counted++, g->touched += NAV_LANES) {
-        const float *mass = h->now.mass + (size_t)g->job.counted * NAV_LANES;
-        if (g->touched + NAV_LANES > most)
-            return false;
-        for (int k = 0; k < NAV_LANES; k++) {
-            g->job.light += mass[k] < worth ? (double)mass[k] : 0.0;
-            g->job.crowd += mass[k] < worth ? 0.0 : 1.0;
-        }
+    double light = 0.0;
+    g->crowd = 0.0;
+    for (size_t n = 0; n < (size_t)nav_histogram_groups(h) * NAV_LANES; n++) {
+        light += h->now.mass[n] < worth ? (double)h->now.mass[n] : 0.0;
+        g->crowd += h->now.mass[n] < worth ? 0.0 : 1.0;
     }
-    g->scattered = g->job.light / h->total;
-    g->crowd = g->job.crowd;
-    return true;
+    g->scattered = light / h->total;
 }
 
-/* From the pass to the count. While even the heaviest cell is worth less than several hypotheses, or cells are still to
- * be refined, there are too many for a cloud. */
-static void global_passed(struct adaptive_global *g)
+/* While even the heaviest cell is worth less than several hypotheses, or cells are still to be refined, there are too
+ * many for a cloud. */
+static void global_take_job(struct adaptive_global *g, struct adaptive_log *log, double hazard)
 {
     struct nav_histogram *h = &g->histogram;
-    double worth = h->total / g->room;
+    global_pass(g, log, hazard);
     bool refined = h->level > 0 && h->total > 0.0 && 8 * h->cells <= REFINED_MOST && nav_histogram_refine(h);
     g->scattered = 1.0;
-    g->touched += refined ? h->cells : 0;
     global_end(g);
     if (!refined && !h->uniform && h->level == 0 &&
-        (double)h->heaviest >= g->problem->settings.adaptive.per_bin * worth)
-        g->job.phase = ADAPTIVE_COUNT;
+        (double)h->heaviest * g->room >= g->problem->settings.adaptive.per_bin * h->total)
+        global_count(g);
 }
 
-/* Goes on with a job; false: not within `most` cells. */
-static bool global_go_on(struct adaptive_global *g, long most)
+void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log, double hazard)
 {
-    if (g->job.phase == ADAPTIVE_PASS) {
-        /* Kept back: what it takes to refine the cells that are left. */
-        long kept = g->histogram.level > 0 ? REFINED_MOST : 0;
-        g->touched += nav_histogram_run(&g->histogram, most - kept - g->touched);
-        if (nav_histogram_running(&g->histogram))
-            return false;
-        global_passed(g);
-    } else if (global_count(g, most)) {
-        g->job.phase = ADAPTIVE_IDLE;
-    } else {
-        return false;
-    }
-    return true;
-}
-
-void adaptive_global_work(struct adaptive_global *g, struct adaptive_log *log, long budget)
-{
-    long most = g->touched + budget;
     if (log->head - g->next > ADAPTIVE_ROWS_KEPT) /* rows that it has not seen are overwritten */
         adaptive_global_restart(g, adaptive_log_reach(log));
-    do {
-        if (g->job.phase != ADAPTIVE_IDLE)
-            continue;
-        if (g->next == log->head || g->touched + JOB_CELLS > most)
-            return;
-        g->touched += JOB_CELLS;
-        global_begin(g, log);
-    } while (global_go_on(g, most));
+    for (g->touched = g->distinct = 0; g->next != log->head && g->touched < ROW_CELLS;)
+        global_take_job(g, log, hazard);
 }
 
 void adaptive_global_restart(struct adaptive_global *g, uint64_t row)
 {
     const struct nav_arena *arena = &g->problem->arena;
     nav_histogram_restart(&g->histogram, g->first.level);
-    g->next = row;
-    g->job.phase = ADAPTIVE_IDLE;
+    g->next = g->hazarded = row;
     g->gained = 0.0;
     g->scattered = 1.0;
     g->summary.mean = nav_gaussian_uniform(arena).mean;
@@ -317,8 +294,7 @@ double adaptive_global_fill(struct adaptive_global *g)
     struct squares squares = {0.0};
     struct nav_shape finest = nav_levels_shape(&h->levels, 0);
     nav_mixture_fill(&g->problem->prior, h);
-    nav_histogram_begin(h, still, &all, still);
-    nav_histogram_run(h, LONG_MAX);
+    nav_histogram_pass(h, still, &all, still);
     nav_histogram_each(h, global_square, &squares);
     g->summary.mass = nav_histogram_mode(h, &g->summary.mean);
     double finer = (double)nav_shape_cells(&finest) / (double)nav_shape_cells(&h->shape);
@@ -381,65 +357,44 @@ struct nav_pending adaptive_global_since(const struct adaptive_global *g, const 
 {
     struct nav_pending since = adaptive_log_since(log, g->next);
     nav_pending_add(&since, pending->step, pending->noise);
-    if (g->job.phase == ADAPTIVE_PASS) { /* its rows' noise is among the histogram's */
-        since.noise.position += g->job.pending.position - g->histogram.pending_position;
-        since.noise.heading += g->job.pending.heading - g->histogram.pending_heading;
-    }
     return since;
 }
 
-/* Cells half as wide as the finest detail that a sensor resolves, where that is less than the setting's. */
-static int global_levels(struct adaptive_global *g, struct nav_levels *levels, double *detail)
+static int global_levels(struct adaptive_global *g, struct nav_levels *levels)
 {
     const struct nav_problem *problem = g->problem;
     const struct nav_settings *s = &problem->settings;
-    struct nav_sensors sensors;
-    int failed = nav_sensors_init(&sensors, &problem->arena, &problem->robot, s, 0.0);
-    struct nav_detail finest = nav_sensors_detail(&sensors);
-    nav_sensors_free(&sensors);
-    *detail = finest.detail;
-    double degrees = s->adaptive.cell_deg, tip = fmax(finest.lever, NAV_NEAR_M / 10.0);
-    bool fine = finest.detail / 2.0 < s->adaptive.cell_m;
-    g->wanted = fmin(s->adaptive.cell_m, finest.detail / 2.0);
-    g->budget = fine ? fmax(s->adaptive.budget, s->adaptive.detail_budget) : s->adaptive.budget;
-    if (fine)
-        degrees = fmin(degrees, TURN_SHARE * g->wanted / tip * 180.0 / NAV_PI);
-    *levels = (struct nav_levels){problem->arena.size_x, problem->arena.size_y, g->wanted, 0, 0};
-    levels->headings = (int)fmax(round(360.0 / fmax(degrees, DEGREES_LEAST)), 1.0);
-    levels->headings += levels->headings % 4 ? 4 - levels->headings % 4 : 0;
-    levels->headings_least = (int)(360.0 / DEGREES_MOST);
-    return failed;
+    struct nav_cell scene;
+    if (nav_problem_cell(problem, 0.0, &scene) || nav_problem_cell(problem, s->adaptive.cell_m, &g->cell))
+        return -1;
+    g->wanted = fmin(scene.edge, g->cell.edge);
+    *levels = (struct nav_levels){problem->arena.size_x, problem->arena.size_y, g->cell.edge, 0, 0};
+    levels->headings = (nav_cell_headings(&g->cell) + 3) / 4 * 4;
+    levels->headings_least = (int)(2.0 * NAV_PI / HEADING_MOST);
+    return 0;
 }
 
-/* The finest level whose cells are few rows' budgets; where these are too wide for the detail, one that is not, or that
- * the table has room for. */
-static int global_first_level(const struct adaptive_global *g, const struct nav_levels *levels, double detail)
+/* The finest level whose cells are passed over in a row; where these are too wide for the detail, one that is not, or
+ * that the table has room for. */
+static int global_first_level(const struct adaptive_global *g, const struct nav_levels *levels)
 {
     enum { LEVELS = 16 };
-    double few = g->problem->settings.adaptive.rows * g->budget;
+    const double few = ROW_CELLS / 2; /* each is passed over and weighed */
     for (int level = 0; level < LEVELS; level++) {
         struct nav_shape shape = nav_levels_shape(levels, level);
         double cells = nav_shape_inside(&shape);
-        if ((g->open * cells <= few && cells <= CELLS_MOST) || (2.0 * shape.cell > detail / 2.0 && cells <= CELLS_MOST))
+        if ((g->open * cells <= few && cells <= CELLS_MOST) ||
+            (2.0 * shape.cell > g->cell.pattern / 2.0 && cells <= CELLS_MOST))
             return level;
     }
     return LEVELS;
-}
-
-/* A row's budget grows with what there is to search, so that it is passed over in so many rows wherever it can be. */
-static double global_budget(const struct adaptive_global *g, const struct nav_levels *levels)
-{
-    const struct nav_settings *s = &g->problem->settings;
-    struct nav_shape shape = nav_levels_shape(levels, g->first.level);
-    return fmax(g->budget, fmin(g->open * nav_shape_inside(&shape) / s->adaptive.rows, s->adaptive.detail_budget));
 }
 
 static int global_tables(struct adaptive_global *g)
 {
     const struct nav_problem *problem = g->problem;
     const struct nav_shape *s = &g->histogram.shape;
-    /* A look-up stands for a part of a cell: that spreads the distances it should give. */
-    double blur = hypot(s->cell / SUB, NAV_LEVER_M * s->cell_theta / TURNS) / sqrt(12.0);
+    double blur = nav_cell_blur(s->cell, s->cell_theta, g->cell.lever, SUB, TURNS);
     g->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, blur);
     if (!g->likelihood)
         return -1;
@@ -453,24 +408,17 @@ static int global_tables(struct adaptive_global *g)
     return g->expected && g->factor ? 0 : -1;
 }
 
-/* Most hypotheses: adaptive.most, and a tenth of the budget, since each may be touched up to five times per row. */
-static double global_room(const struct nav_settings *s)
-{
-    return floor(fmax(fmin(s->adaptive.most, s->adaptive.budget / 10.0), 16.0));
-}
-
 int adaptive_global_init(struct adaptive_global *g, const struct nav_problem *problem, const struct nav_ground *ground)
 {
     struct nav_levels levels;
-    double detail;
-    *g = (struct adaptive_global){.problem = problem, .room = global_room(&problem->settings), .open = ground->open};
-    if (global_levels(g, &levels, &detail))
+    *g = (struct adaptive_global){
+        .problem = problem, .room = floor(problem->settings.adaptive.most), .open = ground->open};
+    if (global_levels(g, &levels))
         return -1;
-    g->first.level = global_first_level(g, &levels, detail);
-    g->budget = global_budget(g, &levels);
+    g->first.level = global_first_level(g, &levels);
     struct nav_shape first = nav_levels_shape(&levels, g->first.level);
     g->first.cells = nav_shape_inside(&first);
-    g->first.too_wide = 2.0 * first.cell > detail ? first.cell : 0.0;
+    g->first.too_wide = 2.0 * first.cell > g->cell.pattern ? first.cell : 0.0;
     g->poses.drawn = calloc((size_t)g->room + 1, sizeof *g->poses.drawn);
     g->poses.grain = calloc((size_t)g->room + 1, sizeof *g->poses.grain);
     if (!g->poses.drawn || !g->poses.grain ||

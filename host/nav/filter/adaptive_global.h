@@ -1,7 +1,7 @@
 /* The adaptive filter's arena-wide belief: a histogram that is asleep while the robot is known.
  *
- * It takes rows from the log in jobs, each one pass over the cells that hold mass, which may be spread over rows. Rows
- * without contact that lie close to each other make one job. It begins with cells as coarse as the arena asks for,
+ * It takes rows from the log in jobs, each one pass over the cells that hold mass. Rows without contact that lie close
+ * to each other make one job. It begins with cells as coarse as the arena asks for,
  * whose expectations are a table; whenever its mass sits in few enough of them they are refined, and what finer cells
  * expect is worked out where they hold mass. */
 #ifndef NAV_ADAPTIVE_GLOBAL_H
@@ -12,20 +12,13 @@
 #include "histogram.h"
 #include "particles.h"
 
-/* What a job does: reads rows and passes over the cells, counts those worth a hypothesis. */
-enum adaptive_phase { ADAPTIVE_IDLE, ADAPTIVE_PASS, ADAPTIVE_COUNT };
-
 /* Some rows on their way into the belief. */
 struct adaptive_job {
-    enum adaptive_phase phase;
     struct nav_pose step;
-    double reference;         /* log-likelihood of the best codes: factors are relative to it */
-    double local;             /* log-likelihood of its rows by the local belief */
-    uint64_t end;             /* first row after it */
-    struct nav_noise pending; /* of the histogram before it */
-    bool uniform;             /* what it began from */
-    uint32_t counted;         /* groups of cells */
-    double light, crowd;      /* mass of cells worth less than a hypothesis, and how many are worth more */
+    double reference; /* log-likelihood of the best codes: factors are relative to it */
+    double local;     /* log-likelihood of its rows by the local belief */
+    uint64_t end;     /* first row after it */
+    bool uniform;     /* what it began from */
 };
 
 /* The level that it begins with. */
@@ -51,18 +44,19 @@ struct adaptive_global {
     struct nav_histogram histogram;
     struct nav_weigh weigh;
     struct adaptive_first first;
-    double wanted;  /* m, edge of a cell that the scene's detail asks for */
-    double open;    /* share of the cells that can hold mass: the ground's */
-    double budget;  /* cells and hypotheses touched per row, at most */
-    float **factor; /* [whiskers][codes] log-likelihood of the present job */
+    struct nav_cell cell; /* the finest level's */
+    double wanted;        /* m, its edge where no user sets another */
+    double open;          /* share of the cells that can hold mass: the ground's */
+    float **factor;       /* [whiskers][codes] log-likelihood of the present job */
     struct adaptive_job job;
     uint64_t next;           /* first row of the log that it has not seen */
+    uint64_t hazarded;       /* row up to which the hazard was given */
     double gained;           /* log-likelihood of the rows seen, less the local belief's, since the restart */
     struct nav_mode summary; /* where it holds most, at row `next` - 1 */
     double room;             /* hypotheses that a cloud could hold */
     struct adaptive_poses poses;
     double scattered, crowd; /* share of mass in cells worth less than a hypothesis; cells that are worth more */
-    long touched, distinct;  /* since they were last cleared */
+    long touched, distinct;  /* for the last row */
 };
 
 /* 0, or -1 without memory; adaptive_global_free either way. */
@@ -79,8 +73,9 @@ void adaptive_global_clear(struct adaptive_global *, uint64_t row);
  * worth. */
 double adaptive_global_fill(struct adaptive_global *);
 
-/* Takes rows from the log until it has seen them all or has passed over `budget` cells. */
-void adaptive_global_work(struct adaptive_global *, struct adaptive_log *, long budget);
+/* Takes rows from the log until it has seen them all, or the next ones are better left to the next row. hazard: as
+ * motion.hazard, of a belief that is all there is; 0 else. */
+void adaptive_global_work(struct adaptive_global *, struct adaptive_log *, double hazard);
 
 /* Whether every row of the log has been seen. */
 bool adaptive_global_current(const struct adaptive_global *, const struct adaptive_log *);

@@ -43,6 +43,15 @@ static void *foveal_create(const struct nav_problem *problem)
     f->cells = (int)settings->foveal.cells;
     f->spacing = settings->foveal.diameter_m / (f->cells - 1);
     f->spacing_theta = settings->foveal.span_deg * NAV_PI / 180.0 / (f->cells - 1);
+    struct nav_cell cell;
+    if (nav_problem_cell(problem, 0.0, &cell)) {
+        free(f);
+        return NULL;
+    }
+    if (cell.edge < f->spacing) { /* a scene of finer detail than the paper's has a smaller fovea */
+        f->spacing = cell.edge;
+        f->spacing_theta = fmin(cell.heading, f->spacing_theta);
+    }
     f->weight = calloc(foveal_points(f), sizeof *f->weight);
     f->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, settings, f->spacing / sqrt(12.0));
     if (!f->likelihood || !f->weight) {

@@ -1,9 +1,8 @@
 /* The exact filter: equation 4 on a grid over the whole arena.
  *
  * A cell's likelihood is the mean over its sub-poses, so that a border that cuts a cell counts by its share. Where the
- * robot cannot stand the likelihood is 0. Motion is put off until something is read: one pass then does for several
- * rows, and nothing is lost, since motions compose exactly. */
-#include <limits.h>
+ * robot cannot stand the likelihood is 0. A cell that holds less than the hazard gives is dropped. Motion is put off
+ * until something is read: one pass then does for several rows, and nothing is lost, since motions compose exactly. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,17 +18,23 @@
 static const double SURE = 0.5;   /* confidence from which a belief judges whiskers, */
 static const double LIGHT = 1e-4; /* by cells with more mass than this */
 
+/* Cells narrower than a belief's widest, at most: 50 bytes each with their tables. */
+static const double CELLS_MOST = 2.5e6;
+
 struct grid {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
+    struct nav_cell wanted; /* cells that the scene asks for */
     struct nav_expected *expected;
     struct nav_histogram histogram;
     struct nav_weigh weigh;
-    struct nav_layer *layer;    /* [slices] where each lies in the tables */
+    int slice;                  /* whose place in the tables is */
+    struct nav_layer layer;     /* this */
     struct nav_pending pending; /* since the last update */
     struct nav_pose mean;       /* near the mode, at the last update */
     double near;                /* before the present row: from SURE on it judges its readings, and the odometry */
     bool sure;
+    long unhazarded; /* rows read since the hazard was last given */
     struct nav_calibration calibration;
     struct nav_motion last; /* motion of the row before, as applied */
 };
@@ -40,16 +45,7 @@ static void grid_destroy(void *self)
     nav_likelihood_free(g->likelihood);
     nav_expected_free(g->expected);
     nav_histogram_free(&g->histogram);
-    free(g->layer);
     free(g);
-}
-
-static void grid_find_layers(struct grid *g)
-{
-    const struct nav_histogram *h = &g->histogram;
-    for (int p = 0; p < h->shape.nh; p++)
-        g->layer[p] = nav_expected_layer(g->expected, nav_histogram_heading(h, p), nav_histogram_shift_x(h, p),
-                                         nav_histogram_shift_y(h, p));
 }
 
 /* Adds what a cell near the pose expected expects, before it is weighed; light ones are left out. */
@@ -65,7 +61,7 @@ static void grid_expect_cell(struct grid *g, int p, int line, int column, double
     if (hypot(x, y) > NAV_NEAR_M || fabs(nav_wrap(turn)) > NAV_NEAR_RAD)
         return;
     for (int n = 0; n < poses; n++) {
-        const uint8_t *codes = nav_expected_codes(g->expected, &g->layer[p], line, column, n);
+        const uint8_t *codes = nav_expected_codes(g->expected, &g->layer, line, column, n);
         if (codes)
             nav_trust_add(g->likelihood, codes, mass / poses);
     }
@@ -74,30 +70,53 @@ static void grid_expect_cell(struct grid *g, int p, int line, int column, double
 static long grid_weigh_group(void *self, int p, int line, int group, const float *mass, float *like)
 {
     struct grid *g = self;
-    nav_expected_mean(g->expected, &g->layer[p], line, group * NAV_LANES, mass, like);
+    const struct nav_histogram *h = &g->histogram;
+    if (g->slice != p)
+        g->layer = nav_expected_layer(g->expected, nav_histogram_heading(h, p), nav_histogram_shift_x(h, p),
+                                      nav_histogram_shift_y(h, p));
+    g->slice = p;
+    nav_expected_mean(g->expected, &g->layer, line, group * NAV_LANES, mass, like);
     for (int k = 0; k < NAV_LANES && g->sure; k++)
         grid_expect_cell(g, p, line, group * NAV_LANES + k, (double)mass[k]);
     return 0;
 }
 
-/* Moves, multiplies by the likelihood and normalises; `extra` is added to each cell first. Returns false with no mass.
- */
+/* What every cell is given of the chance that the robot was put there. */
+static double grid_hazard(struct grid *g)
+{
+    double hazard = nav_problem_hazard(g->problem);
+    if (++g->unhazarded < NAV_HAZARD_ROWS || g->histogram.uniform)
+        return 0.0;
+    g->unhazarded = 0;
+    return NAV_HAZARD_ROWS * hazard / nav_shape_inside(&g->histogram.shape);
+}
+
+static double grid_prior(void *self, double x, double y)
+{
+    return nav_likelihood_prior(((struct grid *)self)->likelihood, x, y);
+}
+
+/* Moves, multiplies by the likelihood and normalises; `extra` is added to each cell first, by the prior of its place.
+ * Returns false with no mass. */
 static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
 {
     static const struct nav_weigh noise = {.group = NULL};
     enum { PASSES_MOST = 25 };
     struct nav_histogram *h = &g->histogram;
     for (int n = 0; n < PASSES_MOST && nav_histogram_debt(h) > 1.0 && h->total > 0.0; n++) {
-        nav_histogram_begin(h, step, &noise, g->mean);
-        nav_histogram_run(h, LONG_MAX);
+        nav_histogram_pass(h, step, &noise, g->mean);
         step = (struct nav_pose){0.0, 0.0, 0.0};
     }
     if (!(h->total > 0.0))
         return false;
-    g->weigh = (struct nav_weigh){.group = grid_weigh_group, .self = g, .extra = extra};
-    nav_histogram_begin(h, step, &g->weigh, g->mean);
-    grid_find_layers(g);
-    nav_histogram_run(h, LONG_MAX);
+    double least = NAV_SHARE_LEAST / nav_shape_inside(&h->shape);
+    g->weigh = (struct nav_weigh){.group = grid_weigh_group,
+                                  .self = g,
+                                  .least = nav_problem_hazard(g->problem) > 0.0 ? least : 0.0,
+                                  .extra = extra,
+                                  .prior = grid_prior};
+    g->slice = -1;
+    nav_histogram_pass(h, step, &g->weigh, g->mean);
     return h->total > 0.0 && isfinite(h->total);
 }
 
@@ -147,13 +166,23 @@ static bool grid_make_tables(struct grid *g)
     const struct nav_settings *s = &problem->settings;
     const struct nav_shape *shape = &g->histogram.shape;
     int sub = (int)s->grid.sub, turns = (int)s->grid.sub_heading;
-    /* A look-up stands for poses within half a step and half a turn: that spreads the distances it should give. */
-    double blur = hypot(shape->cell / sub, NAV_LEVER_M * shape->cell_theta / turns) / sqrt(12.0);
+    double blur = nav_cell_blur(shape->cell, shape->cell_theta, g->wanted.lever, sub, turns);
     g->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, blur);
     if (g->likelihood)
         g->expected = nav_expected_new(g->likelihood, shape->cell, shape->nh, sub, turns);
-    g->layer = calloc((size_t)shape->nh, sizeof *g->layer);
-    return g->expected && g->layer;
+    return g->expected;
+}
+
+/* The scene's cells, or wider ones where these would be too many. */
+static int grid_find_cell(struct grid *g, struct nav_cell *cell)
+{
+    const struct nav_arena *arena = &g->problem->arena;
+    double given = g->problem->settings.grid.cell_m, area = arena->size_x * arena->size_y;
+    int failed = nav_problem_cell(g->problem, 0.0, &g->wanted) || nav_problem_cell(g->problem, given, cell);
+    while (!failed && given <= 0.0 && cell->edge < NAV_EDGE_MOST_M &&
+           area / (cell->edge * cell->edge) * nav_cell_headings(cell) > CELLS_MOST)
+        failed = nav_problem_cell(g->problem, fmin(2.0 * cell->edge, NAV_EDGE_MOST_M), cell);
+    return failed;
 }
 
 static void *grid_create(const struct nav_problem *problem)
@@ -164,11 +193,14 @@ static void *grid_create(const struct nav_problem *problem)
         return NULL;
     g->problem = problem;
     nav_calibration_init(&g->calibration);
+    struct nav_cell cell;
+    bool found = grid_find_cell(g, &cell) == 0;
+    cell.heading = s->grid.cell_deg > 0.0 ? s->grid.cell_deg * NAV_PI / 180.0 : cell.heading;
     const struct nav_levels levels = {.size_x = problem->arena.size_x,
                                       .size_y = problem->arena.size_y,
-                                      .cell = s->grid.cell_m,
-                                      .headings = (int)fmax(round(360.0 / s->grid.cell_deg), 1.0)};
-    if (nav_histogram_init(&g->histogram, &levels, 0, 0) || !grid_make_tables(g)) {
+                                      .cell = cell.edge,
+                                      .headings = nav_cell_headings(&cell)};
+    if (!found || nav_histogram_init(&g->histogram, &levels, 0, 0) || !grid_make_tables(g)) {
         grid_destroy(g);
         return NULL;
     }
@@ -195,11 +227,10 @@ static struct nav_motion grid_calibrated(struct grid *g, const struct nav_motion
 static void grid_carry(struct grid *g)
 {
     const double each = NAV_CARRIED / (1.0 - NAV_CARRIED) / nav_shape_inside(&g->histogram.shape);
-    const struct nav_weigh more = {.extra = each};
+    const struct nav_weigh more = {.self = g, .extra = each, .prior = grid_prior};
     if (!(g->histogram.total > 0.0) || g->histogram.uniform)
         return;
-    nav_histogram_begin(&g->histogram, (struct nav_pose){0.0, 0.0, 0.0}, &more, g->mean);
-    nav_histogram_run(&g->histogram, LONG_MAX);
+    nav_histogram_pass(&g->histogram, (struct nav_pose){0.0, 0.0, 0.0}, &more, g->mean);
     g->near *= 1.0 - NAV_CARRIED;
 }
 
@@ -228,7 +259,7 @@ static void grid_update(void *self, const struct nav_evidence *evidence)
     nav_likelihood_read(g->likelihood, evidence);
     grid_expect(g, false);
     nav_trust_begin(g->likelihood);
-    if (!grid_reweigh(g, step, g->problem->settings.grid.teleport / nav_shape_inside(&g->histogram.shape)))
+    if (!grid_reweigh(g, step, grid_hazard(g)))
         grid_forget(g);
     if (sure)
         nav_trust_learn(g->likelihood);
@@ -259,9 +290,8 @@ static long grid_components(const void *self, struct nav_component *out, long ro
 static struct nav_resolution grid_resolution(const void *self)
 {
     const struct grid *g = self;
-    double finest = nav_sensors_detail(&g->likelihood->sensors).detail;
     const struct nav_shape *s = &g->histogram.shape;
-    return (struct nav_resolution){s->cell, s->cell_theta, fmin(s->cell, finest / 2.0), 0.0};
+    return (struct nav_resolution){s->cell, s->cell_theta, fmin(s->cell, g->wanted.edge), 0.0};
 }
 
 const struct nav_filter_ops nav_grid_filter = {.name = "grid",

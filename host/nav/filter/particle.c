@@ -61,8 +61,11 @@ static void *particle_create(const struct nav_problem *problem)
     f->sample = (struct nav_sample){s->particle.error, (long)fmin(least, most), (long)most};
     nav_rng_seed(&f->rng, problem->seed, 0);
     f->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, 0.0);
+    struct nav_cell bin = {.edge = 0.0};
+    if (f->likelihood)
+        bin = nav_sensors_cell(&f->likelihood->sensors, s->particle.cell_m);
     if (!f->likelihood || nav_particles_init(&f->cloud, f->sample.most, false, 0.0) ||
-        nav_bins_init(&f->bins, f->sample.most, s->particle.bin_m, s->particle.bin_deg * NAV_PI / 180.0)) {
+        nav_bins_init(&f->bins, f->sample.most, bin.edge, bin.heading)) {
         particle_destroy(f);
         return NULL;
     }

@@ -121,19 +121,13 @@ static struct nav_motion intake_take_odometry(struct nav_intake *in, const struc
     return nav_gaps_bridge(&in->gaps, known ? &step : NULL, missing, before, row->t_s);
 }
 
-/* Distance from the robot's centre to the end of a sensor. */
-static double intake_lever(const struct nav_model *model)
-{
-    return hypot(model->place.x + model->length * model->place.c, model->place.y + model->length * model->place.s);
-}
-
 static void intake_add_path(struct nav_intake *in, const struct nav_motion *motion)
 {
     double distance = hypot(motion->step.x, motion->step.y) + motion->unknown_m;
     double turn = fabs(motion->step.theta) + motion->unknown_rad;
     for (int w = 0; w < in->sensors.count; w++)
         in->track[w].moved +=
-            motion->carried ? (double)INFINITY : distance + intake_lever(&in->sensors.model[w]) * turn;
+            motion->carried ? (double)INFINITY : distance + nav_model_lever(&in->sensors.model[w]) * turn;
 }
 
 /* Takes sensor w's reading from a row; returns how much of it counts. */

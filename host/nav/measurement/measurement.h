@@ -109,11 +109,31 @@ int nav_sensors_init(struct nav_sensors *, const struct nav_arena *, const struc
                      const struct nav_settings *, double blur_m);
 void nav_sensors_free(struct nav_sensors *);
 
-/* Finest detail that any sensor resolves, m, and the farthest sensor that resolves it, m from the centre. */
-struct nav_detail {
-    double detail, lever;
+/* Distance from the robot's centre to the end of a sensor, m. */
+double nav_model_lever(const struct nav_model *);
+
+/* Cells in which a belief tells apart what the readings do: half as wide as the finest detail that a sensor resolves,
+ * and turned by no more than moves the farthest such sensor, `lever` m from the robot's centre, by part of that. */
+struct nav_cell {
+    double edge, heading, lever; /* m, rad, m */
+    double pattern; /* m, finest detail of what is no distance: wider cells average it away, where they only
+                       blur a distance */
 };
-struct nav_detail nav_sensors_detail(const struct nav_sensors *);
+
+#define NAV_EDGE_MOST_M (NAV_NEAR_M / 5.0) /* a belief is no coarser, however little its sensors tell apart */
+
+/* The same for every filter. edge_m: the edge that a user wants; 0: the scene's. */
+struct nav_cell nav_sensors_cell(const struct nav_sensors *, double edge_m);
+
+/* Gives it from the problem alone: 0, or -1 without memory. */
+int nav_problem_cell(const struct nav_problem *, double edge_m, struct nav_cell *);
+
+/* Slices of a whole turn that are no wider than a cell's heading. */
+int nav_cell_headings(const struct nav_cell *);
+
+/* Standard deviation of a contact's distance over the poses that a look-up stands for, `sub` of them per edge and
+ * `turns` per heading of a cell, m. */
+double nav_cell_blur(double edge, double heading, double lever, int sub, int turns);
 
 /* Farthest point from the robot's centre that its body or a sensor reaches, m. */
 double nav_sensors_reach(const struct nav_sensors *, const struct nav_robot *);

@@ -50,6 +50,7 @@ static int range_init(struct nav_model *model, const struct nav_arena *arena, co
     model->place.c = cos(ray->yaw);
     model->place.s = sin(ray->yaw);
     model->length = ray->length;
+    model->detail = ray->length; /* from nothing within reach to touching at the root */
     model->spacing = model->settings->radial.spacing_m;
     model->sigma = hypot(robot->radial_sigma, blur_m);
     model->edge = hypot(model->settings->radial.edge_m, blur_m);

@@ -79,7 +79,7 @@ const char *nav_prior_fault(const struct nav_arena *, const struct nav_prior *, 
 #define NAV_NEAR_RAD 0.5
 
 /* Share of the mass that a stored mixture loses to "anywhere": between storing and loading the robot may have been
- * carried off. A restart in a hundred is far more than a filter that was there doubts (adaptive.hazard, per row), and
+ * carried off. A restart in a hundred is far more than a filter that was there doubts (motion.hazard, per row), and
  * little enough that a belief which was right stays the answer. Filters that hold one Gaussian, or a few, cannot keep
  * it. */
 #define NAV_ANYWHERE 0.01
@@ -92,5 +92,9 @@ const char *nav_prior_fault(const struct nav_arena *, const struct nav_prior *, 
 #ifdef __cplusplus
 }
 #endif
+
+/* The hazard of a row: settings.motion.hazard, or a tenth of it where some ground is not mapped. Readings there are
+ * taken as independent, which they are not: any mapped place of the same texture soon explains them better. */
+double nav_problem_hazard(const struct nav_problem *);
 
 #endif

@@ -43,14 +43,14 @@ struct nav_motion_settings {
     double drift_rad; /* heading error of a straight metre, standard deviation */
     double calibrate; /* 1: learns constant errors of the odometry (calibration.h), where the filter can */
     double gaps;      /* 1: estimates the motion of rows that never came (gap.h); 0: takes it as none */
+    double hazard;    /* probability at any row read that the robot has been put to another place, on mapped ground */
 };
 
 struct nav_grid_settings {
-    double cell_m;      /* edge of a cell of the grid */
-    double cell_deg;    /* its extent in heading; the number of slices is rounded */
+    double cell_m;      /* edge of a cell; 0: as the scene's detail asks (measurement.h) */
+    double cell_deg;    /* its extent in heading; 0: as its edge asks */
     double sub;         /* likelihood: sub-poses per cell edge */
     double sub_heading; /* likelihood: sub-poses per cell heading */
-    double teleport;    /* probability per reading that the robot has been put to another place */
 };
 
 struct nav_foveal_settings {
@@ -68,28 +68,21 @@ struct nav_particle_settings {
     double least;         /* fewest particles */
     double most;          /* most particles */
     double error;         /* of that belief, Kullback-Leibler divergence exceeded once in a hundred rows */
-    double bin_m;         /* edge of a bin of that belief */
-    double bin_deg;       /* its extent in heading */
+    double cell_m;        /* edge of a bin of that belief; 0: as the scene's detail asks */
     double resample;      /* resamples when the effective share of the particles falls below this */
     double recovery;      /* slow rate at which the mean weight is followed; 0: no recovery by injection */
     double recovery_fast; /* fast rate */
 };
 
 struct nav_adaptive_settings {
-    double budget;        /* most cells and particles touched per row */
-    double detail_budget; /* the same where small tiles ask for cells below cell_m; in large arenas, at most */
-    double most;          /* particles, at most */
-    double least;         /* particles, at least */
-    double per_bin;       /* particles in each bin that they occupy */
-    double bin_m;         /* edge of a bin */
-    double bin_deg;       /* its extent in heading */
-    double gain;          /* prior standard deviation of the odometry's gains */
-    double cell_m;        /* edge of the arena-wide histogram's finest cells; less on small tiles */
-    double cell_deg;      /* their extent in heading */
-    double rows;          /* it begins with at most so many budgets of cells, where these are not too wide for tiles */
-    double hazard;        /* probability at any row that the robot has been put to another place */
-    double wake;          /* odds of a kidnap at which the histogram wakes */
-    double scattered;     /* share of the histogram that a cloud may leave out */
+    double most;      /* particles, at most */
+    double least;     /* particles, at least */
+    double per_bin;   /* particles in each bin, half a cell each way, that they occupy */
+    double gain;      /* prior standard deviation of the odometry's gains */
+    double cell_m;    /* edge of the arena-wide histogram's finest cells, bins half as wide; 0: as the scene's detail
+                         asks */
+    double wake;      /* odds of a kidnap at which the histogram wakes */
+    double scattered; /* share of the histogram that a cloud may leave out */
 };
 
 struct nav_settings {

@@ -1,5 +1,4 @@
 /* The histogram: against a dense computation in double precision, cell by cell, and by what must stay as it is. */
-#include <limits.h>
 #include <stdlib.h>
 
 #include "mixture.h"
@@ -32,8 +31,7 @@ static void put(struct nav_histogram *h, int i, int j, int p, double mass)
 
 static void pass(struct nav_histogram *h, struct nav_pose step, const struct nav_weigh *weigh)
 {
-    nav_histogram_begin(h, step, weigh, STILL);
-    nav_histogram_run(h, LONG_MAX);
+    nav_histogram_pass(h, step, weigh, STILL);
 }
 
 static void move(struct nav_histogram *h, struct nav_pose step, double position, double heading)
@@ -212,7 +210,7 @@ static void a_pass_is_what_a_dense_computation_gives(void **state)
     (void)state;
     for (int kind = 0; kind < 3; kind++) { /* mass alone; light cells dropped; belief added everywhere */
         struct nav_histogram h = scattered();
-        const struct nav_weigh weigh = {weigh_group, NULL, 3, kind == 1 ? 1e-3 : 0.0, kind == 2 ? 1e-4 : 0.0};
+        const struct nav_weigh weigh = {weigh_group, NULL, kind == 1 ? 1e-3 : 0.0, kind == 2 ? 1e-4 : 0.0, NULL};
         double *expected = dense(&h);
         naive(expected, &h.shape, 0.2, 0.15, weigh.extra, weigh.least);
         h.pending_position = 0.4 * h.shape.cell * h.shape.cell;
@@ -231,31 +229,6 @@ static void a_pass_is_what_a_dense_computation_gives(void **state)
         free(got);
         nav_histogram_free(&h);
     }
-}
-
-static void an_interrupted_pass_gives_the_same_bits(void **state)
-{
-    (void)state;
-    enum { MOST = 400 };
-    struct nav_histogram a = scattered(), b = scattered();
-    const struct nav_weigh weigh = {weigh_group, NULL, 3, 1e-8, 0.0};
-    const struct nav_pose step = {0.23, 0.04, 0.3};
-    a.pending_position = b.pending_position = 0.6 * a.shape.cell * a.shape.cell;
-    a.pending_heading = b.pending_heading = 0.2 * a.shape.cell_theta * a.shape.cell_theta;
-    double before = total(&b);
-    pass(&a, step, &weigh);
-    nav_histogram_begin(&b, step, &weigh, STILL);
-    int parts = 0;
-    for (; nav_histogram_running(&b); parts++) {
-        assert_near(total(&b), before, 0.0); /* until it ends the belief is the one before */
-        assert_in_range(nav_histogram_run(&b, MOST), 1, MOST);
-    }
-    assert_in_range(parts, 10, 100000);
-    assert_int_equal(nav_histogram_groups(&a), nav_histogram_groups(&b));
-    assert_memory_equal(a.now.mass, b.now.mass, nav_histogram_groups(&a) * NAV_LANES * sizeof(float));
-    assert_memory_equal(a.now.moment, b.now.moment, (size_t)a.shape.nh * sizeof *a.now.moment);
-    nav_histogram_free(&a);
-    nav_histogram_free(&b);
 }
 
 /* After half a metre the slices' shifts differ by tens of millimetres. */
@@ -431,7 +404,6 @@ int main(void)
         cmocka_unit_test(noise_adds_the_variance_asked_for_and_keeps_the_mass),
         cmocka_unit_test(mass_that_leaves_the_arena_is_lost),
         cmocka_unit_test(a_pass_is_what_a_dense_computation_gives),
-        cmocka_unit_test(an_interrupted_pass_gives_the_same_bits),
         cmocka_unit_test(mass_poured_between_shifted_slices_stays_within_half_a_cell),
         cmocka_unit_test(a_uniform_belief_stays_uniform_and_takes_no_memory_before_it_is_weighed),
         cmocka_unit_test(a_refined_belief_is_the_same_belief_in_finer_cells),

@@ -1,4 +1,4 @@
-/* The adaptive filter: work within its budget, the same bytes from a seed, found and found again, twins kept. */
+/* The adaptive filter: the same bytes from a seed, found and found again, twins kept. */
 #include "filter.h"
 
 #include <stdlib.h>
@@ -10,13 +10,11 @@ enum { ROWS = 400, ROOM = 200000 };
 
 static const struct nav_pose FAR = {1.6, 0.4, 2.0};
 
-static struct nav_estimate run(struct nav_filter *f, struct wander *w, long rows, double budget)
+static struct nav_estimate run(struct nav_filter *f, struct wander *w, long rows)
 {
     struct nav_estimate e = {.confidence = 0.0};
-    for (long k = 0; k < rows; k++) {
+    for (long k = 0; k < rows; k++)
         nav_filter_step(f, wander_on(w), &e);
-        assert_true((double)e.touched <= budget);
-    }
     return e;
 }
 
@@ -27,8 +25,8 @@ static void it_finds_the_robot_from_nothing_and_stops_looking(void **state)
         struct wander w = wander_new(seed);
         w.problem.prior.uniform = true;
         struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
-        struct nav_estimate first = run(f, &w, 1, w.problem.settings.adaptive.budget);
-        struct nav_estimate last = run(f, &w, ROWS, w.problem.settings.adaptive.budget);
+        struct nav_estimate first = run(f, &w, 1);
+        struct nav_estimate last = run(f, &w, ROWS);
         assert_true(first.confidence < 0.3 && last.confidence > 0.8);
         assert_true(wander_error(&w, &last) < 0.1);
         assert_true(first.states > 10000 && last.states < 3000);
@@ -41,16 +39,15 @@ static void it_notices_a_kidnap_and_finds_the_robot_again(void **state)
     (void)state;
     for (uint64_t seed = 11; seed <= 15; seed++) {
         struct wander w = wander_new(seed);
-        double budget = w.problem.settings.adaptive.budget;
         struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
-        struct nav_estimate e = run(f, &w, 100, budget);
+        struct nav_estimate e = run(f, &w, 100);
         assert_true(wander_error(&w, &e) < 0.1);
         w.pose = FAR;
         double least = 1.0;
         for (int k = 0; k < 120; k++)
-            least = fmin(least, run(f, &w, 1, budget).confidence);
+            least = fmin(least, run(f, &w, 1).confidence);
         assert_true(least < 0.9); /* doubt shows */
-        e = run(f, &w, ROWS, budget);
+        e = run(f, &w, ROWS);
         assert_true(wander_error(&w, &e) < 0.1 && e.confidence > 0.8);
         nav_filter_free(f);
     }
@@ -74,51 +71,15 @@ static void spinning_wheels_do_not_lose_it_for_good(void **state)
     for (uint64_t seed = 71; seed < 71 + SEEDS; seed++) {
         struct wander w = wander_new(seed);
         struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
-        run(f, &w, 100, INFINITY);
+        run(f, &w, 100);
         struct nav_estimate e;
         for (int k = 0; k < 8; k++)
             nav_filter_step(f, spin(&w), &e);
-        e = run(f, &w, 90, INFINITY);
+        e = run(f, &w, 90);
         sum += wander_error(&w, &e);
         nav_filter_free(f);
     }
     assert_true(sum / SEEDS < 0.05); /* 0.16 m were reported that never were */
-}
-
-static void no_row_takes_more_than_its_budget(void **state)
-{
-    (void)state;
-    struct wander w = wander_new(21);
-    w.problem.prior.uniform = true;
-    assert_int_equal(nav_settings_set(&w.problem.settings, "adaptive.budget", 40000.0), 0);
-    struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
-    run(f, &w, ROWS, 40000.0);
-    w.pose = FAR;
-    struct nav_estimate e = run(f, &w, 2 * ROWS, 40000.0);
-    assert_true(wander_error(&w, &e) < 0.1);
-    nav_filter_free(f);
-}
-
-static void rows_without_readings_leave_the_next_its_budget(void **state)
-{
-    (void)state;
-    for (uint64_t seed = 22; seed < 27; seed++) {
-        struct wander w = wander_new(seed);
-        w.problem.prior = (struct nav_prior){.mean = {1.6, 0.4, 2.0}, .sigma = {0.3, 0.3, 0.8}};
-        assert_int_equal(nav_settings_set(&w.problem.settings, "adaptive.budget", 40000.0), 0);
-        struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
-        for (int k = 0; k < ROWS; k++) {
-            const struct nav_row *row = wander_on(&w);
-            for (int i = 0; k % 2 && i < WANDER_TIPS * WANDER_CLASSES; i++)
-                w.texture[i] = NAN;
-            for (int r = 0; k % 2 && r < WANDER_RAYS; r++)
-                w.radial[r] = NAN;
-            struct nav_estimate e;
-            nav_filter_step(f, row, &e);
-            assert_true((double)e.touched <= 40000.0);
-        }
-        nav_filter_free(f);
-    }
 }
 
 static void a_seed_gives_the_same_bytes_and_another_seed_others(void **state)
@@ -130,28 +91,27 @@ static void a_seed_gives_the_same_bytes_and_another_seed_others(void **state)
         struct wander w = wander_new(31);
         w.problem.seed = seeds[n];
         struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
-        run(f, &w, 50, INFINITY);
+        run(f, &w, 50);
         w.pose = FAR;
-        e[n] = run(f, &w, ROWS, INFINITY);
+        e[n] = run(f, &w, ROWS);
         nav_filter_free(f);
     }
     assert_memory_equal(&e[0], &e[1], sizeof e[0]);
     assert_memory_not_equal(&e[0].pose, &e[2].pose, sizeof e[0].pose);
 }
 
-/* Masses of the belief as listed, which no state, not even half a job of the histogram, may leave short of 1. */
+/* Masses of the belief as listed, which no state may leave short of 1. */
 static void masses_sum_to_one_in_every_row(void **state)
 {
     (void)state;
     struct wander w = wander_new(81);
     w.problem.prior.uniform = true;
-    assert_int_equal(nav_settings_set(&w.problem.settings, "adaptive.budget", 40000.0), 0);
     struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
     struct nav_component *c = calloc(ROOM, sizeof *c);
     for (int k = 0; k < 150; k++) {
         if (k == 80)
             w.pose = FAR;
-        run(f, &w, 1, 40000.0);
+        run(f, &w, 1);
         long n = nav_filter_components(f, c, ROOM);
         assert_true(n <= ROOM && n == nav_filter_components(f, NULL, 0));
         double sum = 0.0;
@@ -184,12 +144,12 @@ static void it_answers_where_most_belief_is(void **state)
     for (uint64_t seed = 11; seed <= 15; seed++) {
         struct wander w = wander_new(seed);
         struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
-        struct nav_estimate e = run(f, &w, 100, INFINITY);
+        struct nav_estimate e = run(f, &w, 100);
         struct nav_pose before = e.pose;
         w.pose = FAR;
         double worst = 0.0;
         for (int k = 0; k < 100; k++) {
-            e = run(f, &w, 1, INFINITY);
+            e = run(f, &w, 1);
             struct nav_pose step = {w.row.odometry[0], w.row.odometry[1], w.row.odometry[2]};
             before = nav_compose(before, step);
             long n = nav_filter_components(f, c, ROOM);
@@ -212,7 +172,7 @@ static void twins_neither_drift_nor_die(void **state)
     struct nav_component *c = calloc(ROOM, sizeof *c);
     int both = 0;
     for (int k = 0; k < 100; k++) {
-        run(f, &w, 20, w.problem.settings.adaptive.budget);
+        run(f, &w, 20);
         long n = nav_filter_components(f, c, ROOM);
         double here = mass_near(c, n, w.pose);
         double there = mass_near(c, n, (struct nav_pose){2.0 - w.pose.x, 2.0 - w.pose.y, w.pose.theta + NAV_PI});
@@ -231,7 +191,7 @@ static void what_is_not_read_makes_it_no_surer(void **state)
     (void)state;
     struct wander w = wander_new(51);
     struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
-    struct nav_estimate e = run(f, &w, 100, INFINITY);
+    struct nav_estimate e = run(f, &w, 100);
     double confidence = e.confidence, variance = e.covariance[0] + e.covariance[4];
     for (int k = 0; k < 100; k++) {
         const struct nav_row *row = wander_on(&w);
@@ -251,9 +211,9 @@ static void a_prior_inside_a_box_starts_with_the_whole_arena(void **state)
     struct wander w = wander_new(61);
     w.problem.prior = (struct nav_prior){.mean = {0.5, 1.35, 0.0}, .sigma = {0.001, 0.001, 0.01}};
     struct nav_filter *f = nav_filter_new("adaptive", &w.problem);
-    struct nav_estimate e = run(f, &w, 1, INFINITY);
+    struct nav_estimate e = run(f, &w, 1);
     assert_true(e.states > 10000);
-    e = run(f, &w, ROWS, INFINITY);
+    e = run(f, &w, ROWS);
     assert_true(wander_error(&w, &e) < 0.1);
     nav_filter_free(f);
 }
@@ -377,8 +337,6 @@ int main(void)
         cmocka_unit_test(it_finds_the_robot_from_nothing_and_stops_looking),
         cmocka_unit_test(it_notices_a_kidnap_and_finds_the_robot_again),
         cmocka_unit_test(spinning_wheels_do_not_lose_it_for_good),
-        cmocka_unit_test(no_row_takes_more_than_its_budget),
-        cmocka_unit_test(rows_without_readings_leave_the_next_its_budget),
         cmocka_unit_test(a_seed_gives_the_same_bytes_and_another_seed_others),
         cmocka_unit_test(masses_sum_to_one_in_every_row),
         cmocka_unit_test(it_answers_where_most_belief_is),

@@ -5,7 +5,7 @@
 #include "near.h"
 #include "wander.h"
 
-enum { WHISKERS = WANDER_TIPS + WANDER_RAYS, JOB = 10000 /* for a job's beginning and end */, PLENTY = 100000000 };
+enum { WHISKERS = WANDER_TIPS + WANDER_RAYS };
 
 static const struct nav_noise NO_NOISE = {0.0, 0.0};
 static const uint8_t PLAIN[16] = {0};
@@ -45,28 +45,9 @@ static void write(struct belief *b, struct nav_noise noise, const double *textur
                        &(struct nav_evidence){.reading = reading, .weight = weight});
 }
 
-static void work(struct belief *b, long budget)
+static void work(struct belief *b)
 {
-    adaptive_global_work(&b->g, &b->log, budget);
-}
-
-/* Passed over and weighed: two for each cell of a uniform belief. */
-static void a_uniform_belief_is_passed_over_as_far_as_the_budget_goes(void **state)
-{
-    (void)state;
-    struct belief b;
-    begin(&b, 2.0);
-    size_t each = nav_shape_cells(&b.g.histogram.shape) * 2;
-    long budget = JOB + (long)each / 3;
-    write(&b, NO_NOISE, NULL);
-    work(&b, budget);
-    assert_in_range(b.g.touched, budget - 4 * NAV_LANES, budget);
-    assert_true(nav_histogram_running(&b.g.histogram) && !adaptive_global_current(&b.g, &b.log));
-    b.g.touched = 0;
-    work(&b, PLENTY);
-    assert_in_range(b.g.touched, (long)each - budget, (long)each - budget + JOB + 4 * NAV_LANES);
-    assert_true(adaptive_global_current(&b.g, &b.log));
-    end(&b);
+    adaptive_global_work(&b->g, &b->log, 0.0);
 }
 
 /* A belief in few cells costs no more than these, however large the arena. */
@@ -79,11 +60,70 @@ static void a_job_passes_over_what_holds_mass_and_nothing_else(void **state)
     adaptive_global_add(&b.g, (struct nav_pose){1.01, 1.01, 0.3}, 1.0);
     adaptive_global_added(&b.g);
     write(&b, (struct nav_noise){0.0, 0.1 * b.g.histogram.shape.cell_theta * b.g.histogram.shape.cell_theta}, NULL);
-    work(&b, PLENTY);
+    work(&b);
     assert_true(adaptive_global_current(&b.g, &b.log));
     assert_int_equal(b.g.histogram.cells, 3);
-    /* Three slices take from three groups between them each, pass over one, weigh it, and it is counted. */
-    assert_in_range(b.g.touched, JOB, JOB + (7 + 3 * 3) * NAV_LANES);
+    /* Three slices take from three groups between them each, pass over one and weigh it. */
+    assert_in_range(b.g.touched, 1, (7 + 3 * 2) * NAV_LANES);
+    end(&b);
+}
+
+/* While the belief is wide, rows wait: none begins a further pass over the arena than fits, and all are caught up with.
+ */
+static void rows_wait_while_the_belief_is_wide(void **state)
+{
+    (void)state;
+    struct belief b;
+    begin(&b, 2.5);
+    long each = (long)nav_shape_cells(&b.g.histogram.shape) * 2;
+    for (int k = 0; k < 20; k++) {
+        const double reading[WANDER_CLASSES] = {0.0, -1.0, -1.0};
+        write(&b, NO_NOISE, reading);
+        b.log.entry[b.log.head - 1].sharp = true; /* each row is a job */
+    }
+    int rows = 0;
+    for (; !adaptive_global_current(&b.g, &b.log); rows++) {
+        work(&b);
+        assert_in_range(b.g.touched, 1, 500000 + each);
+    }
+    assert_in_range(rows, 2, 20);
+    end(&b);
+}
+
+/* However large the arena, its first pass fits a row, or cells are as wide as the tiles allow; it says so, and its
+ * memory stays. */
+static void large_arenas_begin_in_wide_cells(void **state)
+{
+    (void)state;
+    struct belief b;
+    begin(&b, 2.0);
+    assert_near(b.g.first.too_wide, 0.0, 0.0);
+    end(&b);
+    begin(&b, 60.0);
+    assert_true(adaptive_global_bytes(&b.g) < 64e6);
+    assert_near(b.g.first.too_wide, b.g.histogram.shape.cell, 0.0); /* above half a tile: it says so */
+    assert_true(b.g.first.too_wide > 0.25);
+    end(&b);
+}
+
+/* A belief that is all there is, and sure of one place, is given the chance of a kidnap, some rows' at once. */
+static void a_robot_may_be_carried_while_nothing_else_is_held(void **state)
+{
+    (void)state;
+    const double hazard = 1e-3;
+    struct belief b;
+    begin(&b, 2.0);
+    adaptive_global_clear(&b.g, 0);
+    adaptive_global_add(&b.g, (struct nav_pose){1.01, 1.01, 0.3}, 1.0);
+    adaptive_global_added(&b.g);
+    for (int k = 1; k <= NAV_HAZARD_ROWS; k++) {
+        assert_int_equal(b.g.histogram.cells, k > 1 ? 1 : b.g.histogram.cells);
+        write(&b, NO_NOISE, NULL);
+        adaptive_global_work(&b.g, &b.log, hazard);
+    }
+    double all = nav_shape_inside(&b.g.histogram.shape);
+    assert_near((double)b.g.histogram.cells, all, 0.0);
+    assert_near(1.0 - (double)b.g.histogram.heaviest / b.g.histogram.total, NAV_HAZARD_ROWS * hazard, 1e-3);
     end(&b);
 }
 
@@ -101,7 +141,7 @@ static void what_is_scattered_is_a_share_of_the_mass(void **state)
         adaptive_global_add(&b.g, (struct nav_pose){1.01, 1.51, 0.3}, 0.9 / 90);
     adaptive_global_added(&b.g);
     write(&b, NO_NOISE, NULL);
-    work(&b, PLENTY);
+    work(&b);
     assert_true(adaptive_global_current(&b.g, &b.log));
     assert_near(b.g.scattered, 0.1, 0.02);
     assert_in_range((long)b.g.crowd, 1, 40);
@@ -120,7 +160,7 @@ static void an_impossible_likelihood_is_worked_out_once(void **state)
     adaptive_global_added(&b.g);
     for (int k = 0; k < ADAPTIVE_ROWS_LATE; k++)
         write(&b, NO_NOISE, wrong);
-    work(&b, PLENTY);
+    work(&b);
     assert_true(adaptive_global_current(&b.g, &b.log) && b.g.histogram.uniform); /* nothing was left to believe */
     assert_int_equal(b.g.distinct, 1);
     end(&b);
@@ -140,32 +180,13 @@ static void coarse_cells_are_refined_where_mass_is(void **state)
     for (int level = b.g.first.level; level > 0; level--) {
         assert_near(b.g.scattered, 1.0, 0.0);
         write(&b, NO_NOISE, NULL);
-        work(&b, PLENTY);
+        work(&b);
         assert_int_equal(b.g.histogram.level, level - 1);
     }
     write(&b, NO_NOISE, NULL);
-    work(&b, PLENTY);
+    work(&b);
     assert_near(b.g.histogram.shape.cell, b.g.wanted, 1e-12);
     assert_true(b.g.scattered < 0.5 && b.g.summary.mass > 0.5);
-    end(&b);
-}
-
-/* However large the arena, a uniform belief is passed over in a few rows, and its memory stays. */
-static void large_arenas_get_the_budget_that_they_need(void **state)
-{
-    (void)state;
-    struct belief b;
-    begin(&b, 2.0);
-    assert_near(b.g.budget, b.problem.settings.adaptive.budget, 0.0);
-    assert_near(b.g.first.too_wide, 0.0, 0.0);
-    end(&b);
-    begin(&b, 60.0);
-    double cells = (double)adaptive_global_cells(&b.g), rows = b.problem.settings.adaptive.rows;
-    assert_true(b.g.budget > b.problem.settings.adaptive.budget);
-    assert_near(b.g.budget, cells / rows, 1.0);
-    assert_true(adaptive_global_bytes(&b.g) < 64e6);
-    assert_near(b.g.first.too_wide, b.g.histogram.shape.cell, 0.0); /* above half a tile: it says so */
-    assert_true(b.g.first.too_wide > 0.25);
     end(&b);
 }
 
@@ -182,7 +203,7 @@ static void cells_without_a_table_are_weighed_as_those_with_one(void **state)
         assert_int_equal(adaptive_log_init(&b->log, &b->g.likelihood->sensors), 0);
         b->g.first.level = n; /* the second takes its cells, those of level 0, for finer than the table's */
         write(b, NO_NOISE, texture);
-        work(b, PLENTY);
+        work(b);
     }
     const struct nav_histogram *with = &belief[0].g.histogram, *without = &belief[1].g.histogram;
     assert_int_equal(nav_histogram_groups(with), nav_histogram_groups(without));
@@ -219,12 +240,13 @@ static void the_log_counts_the_memory_of_all_rows_kept(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_uniform_belief_is_passed_over_as_far_as_the_budget_goes),
         cmocka_unit_test(a_job_passes_over_what_holds_mass_and_nothing_else),
+        cmocka_unit_test(rows_wait_while_the_belief_is_wide),
+        cmocka_unit_test(large_arenas_begin_in_wide_cells),
+        cmocka_unit_test(a_robot_may_be_carried_while_nothing_else_is_held),
         cmocka_unit_test(what_is_scattered_is_a_share_of_the_mass),
         cmocka_unit_test(an_impossible_likelihood_is_worked_out_once),
         cmocka_unit_test(coarse_cells_are_refined_where_mass_is),
-        cmocka_unit_test(large_arenas_get_the_budget_that_they_need),
         cmocka_unit_test(cells_without_a_table_are_weighed_as_those_with_one),
         cmocka_unit_test(the_log_counts_the_memory_of_all_rows_kept),
     };

@@ -412,7 +412,7 @@ static void settings_are_set_by_name_and_within_their_range(void **state)
     assert_near(s.foveal.cells, 11.0, 0.0);
     assert_int_equal(nav_settings_set(&s, "grid.cell_m", 0.1), 0);
     assert_near(s.grid.cell_m, 0.1, 0.0);
-    assert_int_equal(nav_settings_set(&s, "grid.cell_m", 0.0), -2);
+    assert_int_equal(nav_settings_set(&s, "grid.cell_m", -0.1), -2);
     assert_int_equal(nav_settings_set(&s, "grid.cell_m", NAN), -2);
     assert_int_equal(nav_settings_set(&s, "grid.cell", 0.1), -1);
     assert_near(s.grid.cell_m, 0.1, 0.0);

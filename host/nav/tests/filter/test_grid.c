@@ -18,7 +18,7 @@ static struct nav_problem diagonal_room(void)
     p.settings.grid.cell_deg = 90.0;
     p.settings.grid.sub = 1.0;
     p.settings.grid.sub_heading = 1.0;
-    p.settings.grid.teleport = 0.0;
+    p.settings.motion.hazard = 0.0;
     p.settings.motion.drift_rad = 1.0; /* large enough for a heading blur in every row, */
     p.settings.motion.along_m = 0.1;   /* and for one blur in position */
     p.prior.sigma[0] = p.prior.sigma[1] = 0.2;
@@ -200,7 +200,7 @@ static void a_belief_with_no_room_left_starts_again_everywhere(void **state)
 {
     (void)state;
     struct nav_problem p = room();
-    p.settings.grid.teleport = 0.0;
+    p.settings.motion.hazard = 0.0;
     p.prior.sigma[0] = p.prior.sigma[1] = 0.01;
     p.prior.mean = (struct nav_pose){0.95, 0.15, 0.0};
     struct grid *g = grid_create(&p);
@@ -327,9 +327,24 @@ static void a_cells_likelihood_is_the_mean_of_its_sub_poses_where_they_now_are(v
     grid_destroy(g);
 }
 
+/* Every sixteenth row, and of a belief that is not everywhere alike. */
+static void the_hazard_of_several_rows_is_given_at_once(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct grid *g = grid_create(&p);
+    double sum = 0.0, cells = nav_shape_inside(&g->histogram.shape);
+    for (int n = 1; n < NAV_HAZARD_ROWS; n++)
+        sum += grid_hazard(g);
+    assert_near(sum, 0.0, 0.0);
+    assert_near(grid_hazard(g), NAV_HAZARD_ROWS * p.settings.motion.hazard / cells, 1e-15);
+    grid_destroy(g);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_hazard_of_several_rows_is_given_at_once),
         cmocka_unit_test(the_grid_is_equation_4),
         cmocka_unit_test(a_cells_likelihood_is_the_mean_of_its_sub_poses_where_they_now_are),
         cmocka_unit_test(motion_put_off_is_kept_exactly),

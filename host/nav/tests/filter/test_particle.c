@@ -184,7 +184,7 @@ static void many_particles_come_to_the_exact_posterior(void **state)
     p.settings.particle.count = 100000.0;
     p.settings.grid.cell_m = 0.025;
     p.settings.grid.cell_deg = 5.0;
-    p.settings.grid.teleport = 0.0;
+    p.settings.motion.hazard = 0.0;
     struct nav_component *list = calloc(ROOM_FOR, sizeof *list);
     double grid[BINS], many[BINS], few[BINS], off_many = 0.0, off_few = 0.0;
     believe(&p, "grid", list, grid);

@@ -111,7 +111,7 @@ def test_structural_mistakes_are_one_line_and_exit_2(capsys, folder, spoil, comp
     [
         (["--filter", "crystal"], "choose one of odometry"),
         (["--set", "grid.cel=1"], "--set grid.cel: no such setting"),
-        (["--set", "grid.cell_m=0"], "outside 0.005 to 1"),
+        (["--set", "grid.cell_m=2"], "outside 0 to 1"),
         (["--set", "grid.cell_m"], "not KEY=NUMBER"),
         (["--seed", "x"], "--seed"),
         (["--fast"], "--fast"),
@@ -160,13 +160,13 @@ def test_settings_reach_the_filter(capsys, folder):
     for cell in ("0.05", "0.1"):
         _, out, _ = run(capsys, "localise", folder, "--filter", "grid", "--set", f"grid.cell_m={cell}", "--json")
         states.append(json.loads(out)["peak_states"])
-    assert states == [90000, 22500]
+    assert states == [50 * 50 * 53, 25 * 25 * 38]
 
 
 def test_lists_and_help(capsys):
     code, out, _ = run(capsys, "localise", "--list-filters")
     assert code == 0 and {"odometry", "foveal", "grid"} <= set(out.split())
-    assert "grid.cell_m=0.05 (0.005 to 1)" in run(capsys, "localise", "--list-settings")[1]
+    assert "grid.cell_m=0 (0 to 1)" in run(capsys, "localise", "--list-settings")[1]
     for words in ([], ["localise"], ["texture"], ["texture", "train"], ["texture", "classify"], ["radial"]):
         code, out, _ = run(capsys, *words, "--help")
         assert code == 0 and "example:\n  whisker " in out

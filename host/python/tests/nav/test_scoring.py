@@ -44,13 +44,13 @@ def test_rows_to_be_judged_are_spread_evenly_over_those_whose_truth_is_known(mos
 
 def test_a_large_belief_is_judged_less_often(monkeypatch):
     made = scenes.make("anchor+global", 3, 40)
-    often = localise.run("grid", made.scene, made.observations, {"grid.cell_m": 0.25}, regions=40)
-    filter = Filter("grid", made.scene, {"grid.cell_m": 0.25})
+    often = localise.run("foveal", made.scene, made.observations, regions=40)
+    filter = Filter("foveal", made.scene)  # as many components in each row
     filter.replay(made.observations, 0, 40)
     count = filter.component_count
     assert count == len(filter.components())
     monkeypatch.setattr(localise, "JUDGED_MOST", count // 4)
-    seldom = localise.run("grid", made.scene, made.observations, {"grid.cell_m": 0.25}, regions=40)
+    seldom = localise.run("foveal", made.scene, made.observations, regions=40)
     judged = np.isfinite(seldom.levels)
     assert np.isfinite(often.levels).all() and 5 <= judged.sum() <= 20
     assert np.array_equal(seldom.levels[judged], often.levels[judged])

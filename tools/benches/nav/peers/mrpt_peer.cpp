@@ -62,9 +62,9 @@ class Mrpt : public peer::Filter
         o.sampleSize = static_cast<unsigned>(cloud_.m_particles.size());
         o.adaptiveSampleSize = most > 0.0;
         if (o.adaptiveSampleSize) {
-            auto &kld = cloud_.options.KLD_params; // the bins, error and least number of `particle`
-            kld.KLD_binSize_XY = scene.problem.settings.particle.bin_m;
-            kld.KLD_binSize_PHI = scene.problem.settings.particle.bin_deg * NAV_PI / 180.0;
+            auto &kld = cloud_.options.KLD_params; // the widest bins of `particle`, its error and least number
+            kld.KLD_binSize_XY = NAV_NEAR_M / 5.0;
+            kld.KLD_binSize_PHI = NAV_NEAR_RAD / 3.0;
             kld.KLD_epsilon = scene.problem.settings.particle.error;
             kld.KLD_minSampleSize = static_cast<unsigned>(scene.problem.settings.particle.least);
             kld.KLD_maxSampleSize = static_cast<unsigned>(most);
