@@ -68,7 +68,7 @@ static void adaptive_destroy(void *self)
 /* Log-odds that the robot is not where the local belief has it. */
 static double adaptive_log_odds(const struct adaptive *a)
 {
-    double hazard = log(nav_problem_hazard(a->problem));
+    double hazard = log(a->problem->settings.motion.hazard);
     if (!a->local)
         return INFINITY;
     bool searched = a->awake && !a->whole;
@@ -190,7 +190,7 @@ static void adaptive_start_search(struct adaptive *a)
     a->modes = a->whole ? a->modes : 0;
     a->whole = false;
     adaptive_kidnap_teach(&a->kidnap, a->likelihood, a->global.likelihood);
-    a->odds = log(nav_problem_hazard(a->problem));
+    a->odds = log(a->problem->settings.motion.hazard);
     adaptive_global_restart(&a->global, a->kidnap.since > reach ? a->kidnap.since : reach);
 }
 
@@ -349,7 +349,7 @@ static void adaptive_search(struct adaptive *a)
 {
     if (!a->awake)
         return;
-    adaptive_global_work(&a->global, &a->log, a->local ? 0.0 : nav_problem_hazard(a->problem));
+    adaptive_global_work(&a->global, &a->log, a->local ? 0.0 : a->problem->settings.motion.hazard);
     a->touched += a->global.touched;
     a->evaluations += a->global.touched;
     a->distinct += a->global.distinct;
@@ -461,7 +461,7 @@ static void adaptive_update(void *self, const struct nav_evidence *evidence)
     struct adaptive *a = self;
     adaptive_hand_over(a);
     nav_likelihood_read(a->likelihood, evidence);
-    adaptive_log_write(&a->log, a->pending.step, a->pending.noise, evidence);
+    adaptive_log_write(&a->log, a->pending.step, a->pending.noise, evidence, a->likelihood->unknown);
     a->answer = nav_compose(a->answer, a->pending.step);
     if (a->local)
         adaptive_update_local(a, evidence);

@@ -13,8 +13,9 @@ int adaptive_log_init(struct adaptive_log *log, const struct nav_sensors *sensor
     }
     log->value = calloc(ADAPTIVE_ROWS_KEPT * log->width + 1, sizeof *log->value);
     log->weight = calloc(ADAPTIVE_ROWS_KEPT * log->whiskers + 1, sizeof *log->weight);
+    log->unknown = calloc(ADAPTIVE_ROWS_KEPT * log->whiskers + 1, sizeof *log->unknown);
     log->reading = calloc(log->whiskers + 1, sizeof *log->reading);
-    return log->offset && log->value && log->weight && log->reading ? 0 : -1;
+    return log->offset && log->value && log->weight && log->unknown && log->reading ? 0 : -1;
 }
 
 void adaptive_log_free(struct adaptive_log *log)
@@ -22,6 +23,7 @@ void adaptive_log_free(struct adaptive_log *log)
     free(log->offset);
     free(log->value);
     free(log->weight);
+    free(log->unknown);
     free(log->reading);
 }
 
@@ -31,7 +33,7 @@ static size_t log_place(uint64_t row)
 }
 
 void adaptive_log_write(struct adaptive_log *log, struct nav_pose step, struct nav_noise noise,
-                        const struct nav_evidence *evidence)
+                        const struct nav_evidence *evidence, const double *unknown)
 {
     size_t n = log_place(log->head++);
     struct adaptive_entry *entry = &log->entry[n];
@@ -39,6 +41,7 @@ void adaptive_log_write(struct adaptive_log *log, struct nav_pose step, struct n
     for (size_t w = 0; w < log->whiskers; w++) {
         const struct nav_model *model = &log->sensors->model[w];
         log->weight[n * log->whiskers + w] = evidence->weight[w];
+        log->unknown[n * log->whiskers + w] = unknown[w];
         if (!(evidence->weight[w] > 0.0))
             continue;
         memcpy(log->value + n * log->width + log->offset[w], evidence->reading[w],
@@ -61,7 +64,9 @@ struct nav_evidence adaptive_log_replay(struct adaptive_log *log, uint64_t row)
 {
     for (size_t w = 0; w < log->whiskers; w++)
         log->reading[w] = log->value + log_place(row) * log->width + log->offset[w];
-    return (struct nav_evidence){.reading = log->reading, .weight = log->weight + log_place(row) * log->whiskers};
+    return (struct nav_evidence){.reading = log->reading,
+                                 .weight = log->weight + log_place(row) * log->whiskers,
+                                 .unknown = log->unknown + log_place(row) * log->whiskers};
 }
 
 struct nav_pending adaptive_log_since(const struct adaptive_log *log, uint64_t from)
@@ -74,5 +79,5 @@ struct nav_pending adaptive_log_since(const struct adaptive_log *log, uint64_t f
 
 size_t adaptive_log_bytes(const struct adaptive_log *log)
 {
-    return sizeof *log + ADAPTIVE_ROWS_KEPT * (log->width + log->whiskers) * sizeof *log->value;
+    return sizeof *log + ADAPTIVE_ROWS_KEPT * (log->width + 2 * log->whiskers) * sizeof *log->value;
 }

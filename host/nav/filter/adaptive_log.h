@@ -30,6 +30,7 @@ struct adaptive_log {
     size_t *offset;         /* [whiskers] of its reading in a row */
     double *value;          /* [ADAPTIVE_ROWS_KEPT][width] */
     double *weight;         /* [ADAPTIVE_ROWS_KEPT][whiskers] */
+    double *unknown;        /* [ADAPTIVE_ROWS_KEPT][whiskers] log-likelihoods where nothing is mapped */
     const double **reading; /* [whiskers] of the row last replayed */
     const struct nav_sensors *sensors;
 };
@@ -38,8 +39,9 @@ struct adaptive_log {
 int adaptive_log_init(struct adaptive_log *, const struct nav_sensors *);
 void adaptive_log_free(struct adaptive_log *);
 
-/* Writes a row, over the oldest. */
-void adaptive_log_write(struct adaptive_log *, struct nav_pose step, struct nav_noise, const struct nav_evidence *);
+/* Writes a row, over the oldest; unknown[whiskers]: its log-likelihoods where nothing is mapped. */
+void adaptive_log_write(struct adaptive_log *, struct nav_pose step, struct nav_noise, const struct nav_evidence *,
+                        const double *unknown);
 
 /* Number of the oldest row that a job may begin with. */
 uint64_t adaptive_log_reach(const struct adaptive_log *);

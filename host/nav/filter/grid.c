@@ -84,7 +84,7 @@ static long grid_weigh_group(void *self, int p, int line, int group, const float
 /* What every cell is given of the chance that the robot was put there. */
 static double grid_hazard(struct grid *g)
 {
-    double hazard = nav_problem_hazard(g->problem);
+    double hazard = g->problem->settings.motion.hazard;
     if (++g->unhazarded < NAV_HAZARD_ROWS || g->histogram.uniform)
         return 0.0;
     g->unhazarded = 0;
@@ -112,7 +112,7 @@ static bool grid_reweigh(struct grid *g, struct nav_pose step, double extra)
     double least = NAV_SHARE_LEAST / nav_shape_inside(&h->shape);
     g->weigh = (struct nav_weigh){.group = grid_weigh_group,
                                   .self = g,
-                                  .least = nav_problem_hazard(g->problem) > 0.0 ? least : 0.0,
+                                  .least = g->problem->settings.motion.hazard > 0.0 ? least : 0.0,
                                   .extra = extra,
                                   .prior = grid_prior};
     g->slice = -1;

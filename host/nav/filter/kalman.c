@@ -300,7 +300,9 @@ static void kalman_update(void *self, const struct nav_evidence *evidence)
     if (!k->linearise)
         return;
     memcpy(k->weight, evidence->weight, (size_t)k->likelihood->sensors.first[1] * sizeof *k->weight);
-    nav_likelihood_read(k->likelihood, &(struct nav_evidence){evidence->reading, k->weight, evidence->track});
+    struct nav_evidence own = *evidence;
+    own.weight = k->weight;
+    nav_likelihood_read(k->likelihood, &own);
     nav_kalman_take(k, evidence);
 }
 

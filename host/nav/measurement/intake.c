@@ -21,7 +21,8 @@ int nav_intake_init(struct nav_intake *in, const struct nav_problem *problem)
     in->values = calloc(values + 1, sizeof *in->values);
     in->reading = calloc(sensors + 1, sizeof *in->reading);
     in->weight = calloc(sensors + 1, sizeof *in->weight);
-    if (!in->track || !in->values || !in->reading || !in->weight ||
+    in->moved = calloc(sensors + 1, sizeof *in->moved);
+    if (!in->track || !in->values || !in->reading || !in->weight || !in->moved ||
         nav_repeat_init(&in->repeat, problem->robot.tips, problem->arena.classes, problem->arena.tile))
         return -1;
     double *value = in->values;
@@ -40,6 +41,7 @@ void nav_intake_free(struct nav_intake *in)
     free(in->values);
     free(in->reading);
     free(in->weight);
+    free(in->moved);
     nav_repeat_free(&in->repeat);
 }
 
@@ -142,6 +144,7 @@ static double intake_read(struct nav_intake *in, int w, const struct nav_row *ro
     double *values = in->values + (in->reading[w] - in->values);
     memcpy(values, cells, (size_t)model->values * sizeof *values);
     double weight = model->kind->novelty(model, &in->track[w], &in->repeat, values);
+    in->moved[w] = in->track[w].moved;
     in->track[w].moved = 0.0;
     return weight;
 }
@@ -160,7 +163,8 @@ bool nav_intake_take(struct nav_intake *in, const struct nav_row *row, struct na
                      struct nav_evidence *evidence)
 {
     *motion = (struct nav_motion){.unknown_m = 0.0};
-    *evidence = (struct nav_evidence){.reading = in->reading, .weight = in->weight, .track = in->track};
+    *evidence =
+        (struct nav_evidence){.reading = in->reading, .weight = in->weight, .track = in->track, .moved = in->moved};
     enum arrival arrival = intake_arrival_of(in, row);
     if (arrival != ON_TIME)
         in->bad_rows++;

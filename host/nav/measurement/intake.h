@@ -26,7 +26,7 @@ struct nav_intake {
     struct nav_repeat repeat;
     double *values; /* storage of the readings */
     const double **reading;
-    double *weight;
+    double *weight, *moved;
 };
 
 /* Whether a row says that the robot was carried. */

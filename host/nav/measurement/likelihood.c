@@ -4,9 +4,38 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "unmapped.h"
+
 /* Cells from which contacts are counted, of an arena with ground that was never mapped: a share of a tenth is then
  * known to a twentieth of itself. */
 enum { SURVEYED = 40000 };
+
+/* States of a sensor of distances where nothing is mapped. */
+enum { NOTHING, SOMETHING };
+
+/* Of a sensor of the floor what may lie under it is a texture; of one that measures distances, where some ground is not
+ * mapped, nothing or something within its reach. */
+static int likelihood_unmapped(struct nav_likelihood *l, int w)
+{
+    const struct nav_arena *arena = l->arena;
+    const struct nav_model *model = &l->model[w];
+    struct nav_unmapped *u = &l->unmapped[w];
+    u->states = model->kind->floor ? model->codes - 1 : model->kind->distance && arena->unknown > 0 ? 2 : 0;
+    u->share = calloc((size_t)u->states + 1, sizeof *u->share);
+    u->now = calloc((size_t)u->states + 1, sizeof *u->now);
+    u->loglik = calloc((size_t)u->states + 1, sizeof *u->loglik);
+    if (!u->share || !u->now || !u->loglik)
+        return -1;
+    for (int k = 0; k < u->states; k++)
+        nav_unmapped_count(u, k, 1.0); /* each as if seen once more */
+    for (int n = 0; model->kind->floor && n < arena->columns * arena->rows; n++) {
+        if (arena->floor[n] < u->states)
+            nav_unmapped_count(u, arena->floor[n], 1.0);
+    }
+    /* A line leaves a square tile after pi/4 of its edge, on average (Cauchy). */
+    nav_unmapped_begin(u, model->kind->floor ? NAV_PI * arena->tile / 4.0 : model->length);
+    return 0;
+}
 
 static int likelihood_tables(struct nav_likelihood *l)
 {
@@ -14,21 +43,24 @@ static int likelihood_tables(struct nav_likelihood *l)
         size_t codes = (size_t)l->model[w].codes;
         l->table[w] = calloc(codes, sizeof **l->table);
         l->ratio[w] = calloc(codes, sizeof **l->ratio);
-        if (!l->table[w] || !l->ratio[w] || nav_trust_init(&l->trust[w], (int)codes))
+        if (!l->table[w] || !l->ratio[w] || nav_trust_init(&l->trust[w], (int)codes) || likelihood_unmapped(l, w))
             return -1;
     }
     return 0;
 }
 
-/* Counts contacts from the mapped cells of the ground, at headings that have nothing to do with one another. */
+/* Counts contacts that are not missed from the mapped cells of the ground, at headings that have nothing to do with one
+ * another. */
 static void likelihood_survey(struct nav_likelihood *l)
 {
     const double golden = NAV_PI * (3.0 - sqrt(5.0));
     const struct nav_ground *g = &l->ground;
     for (int w = 0; w < l->whiskers; w++) {
         struct nav_model *model = &l->model[w];
-        double sum = 0.0, count = 0.0, ghost = model->settings->radial.ghost;
-        for (int n = 0; model->kind->distance && n < g->columns * g->rows; n += 1 + g->columns * g->rows / SURVEYED) {
+        double within = 1.0 - model->settings->radial.miss;
+        if (!model->kind->distance || l->unmapped[w].states == 0)
+            continue;
+        for (int n = 0; n < g->columns * g->rows; n += 1 + g->columns * g->rows / SURVEYED) {
             struct nav_place at = {(n % g->columns + 0.5) / g->per_m, (n / g->columns + 0.5) / g->per_m,
                                    cos(golden * n), sin(golden * n)};
             struct nav_arena near;
@@ -39,10 +71,10 @@ static void likelihood_survey(struct nav_likelihood *l)
             model->kind->expect(model, 1, l->arena, any ? &near : NULL, &at, &code);
             if (code == model->codes - 1)
                 continue;
-            sum += model->noticed[code] + (1.0 - model->noticed[code]) * ghost;
-            count += 1.0;
+            nav_unmapped_count(&l->unmapped[w], NOTHING, 1.0 - model->noticed[code] / within);
+            nav_unmapped_count(&l->unmapped[w], SOMETHING, model->noticed[code] / within);
         }
-        model->met = count > 0.0 ? sum / count : 0.0;
+        nav_unmapped_begin(&l->unmapped[w], model->length);
     }
 }
 
@@ -62,11 +94,14 @@ struct nav_likelihood *nav_likelihood_new(const struct nav_arena *arena, const s
     l->ratio = calloc(whiskers, sizeof *l->ratio);
     l->weight = calloc(whiskers, sizeof *l->weight);
     l->trust = calloc(whiskers, sizeof *l->trust);
+    l->unmapped = calloc(whiskers, sizeof *l->unmapped);
+    l->unknown = calloc(whiskers, sizeof *l->unknown);
     l->scratch = calloc(whiskers, 1);
     l->read = calloc(whiskers, sizeof *l->read);
     failed = nav_map_init(&l->map, arena, whiskers) || failed;
-    if (failed || !l->scratch || !l->read || !l->table || !l->ratio || !l->weight || !l->trust ||
-        likelihood_tables(l) || nav_obstacles_init(&l->obstacles, arena, nav_sensors_reach(&l->sensors, robot)) ||
+    if (failed || !l->scratch || !l->read || !l->table || !l->ratio || !l->weight || !l->trust || !l->unmapped ||
+        !l->unknown || likelihood_tables(l) ||
+        nav_obstacles_init(&l->obstacles, arena, nav_sensors_reach(&l->sensors, robot)) ||
         nav_ground_init(&l->ground, &l->obstacles, robot->body_radius)) {
         nav_likelihood_free(l);
         return NULL;
@@ -84,6 +119,11 @@ void nav_likelihood_free(struct nav_likelihood *l)
         free(l->ratio ? l->ratio[w] : NULL);
         if (l->trust)
             nav_trust_free(&l->trust[w]);
+        if (l->unmapped) {
+            free(l->unmapped[w].share);
+            free(l->unmapped[w].now);
+            free(l->unmapped[w].loglik);
+        }
     }
     nav_sensors_free(&l->sensors);
     nav_obstacles_free(&l->obstacles);
@@ -92,19 +132,50 @@ void nav_likelihood_free(struct nav_likelihood *l)
     free(l->table);
     free(l->ratio);
     free(l->trust);
+    free(l->unmapped);
+    free(l->unknown);
     free(l->weight);
     free(l->scratch);
     free(l->read);
     free(l);
 }
 
-static void likelihood_read_one(struct nav_likelihood *l, int w, const double *reading)
+/* Logarithm of a reading's likelihood, by that of a broken sensor. */
+static double likelihood_log(const struct nav_likelihood *l, int w, double ratio)
+{
+    double trust = l->trust[w].working;
+    return l->weight[w] * log(trust * ratio + 1.0 - trust);
+}
+
+/* The same where nothing is mapped, and the ratio that would give it. */
+static void likelihood_read_unknown(struct nav_likelihood *l, int w, const struct nav_evidence *evidence)
+{
+    struct nav_unmapped *u = &l->unmapped[w];
+    const struct nav_model *model = &l->model[w];
+    double trust = l->trust[w].working;
+    if (evidence->unknown) {
+        l->unknown[w] = evidence->unknown[w];
+    } else {
+        for (int k = 0; k < u->states; k++)
+            u->loglik[k] =
+                model->kind->distance
+                    ? likelihood_log(l, w, nav_range_unmapped(model, evidence->reading[w][0], k == SOMETHING))
+                    : (double)l->table[w][k];
+        l->unknown[w] = nav_unmapped_take(u, evidence->moved ? evidence->moved[w] : (double)INFINITY, u->loglik);
+    }
+    l->table[w][model->codes - 1] = (float)l->unknown[w];
+    l->ratio[w][model->codes - 1] = fmax((exp(l->unknown[w] / l->weight[w]) - (1.0 - trust)) / trust, 0.0);
+}
+
+static void likelihood_read_one(struct nav_likelihood *l, int w, const struct nav_evidence *evidence)
 {
     struct nav_model *model = &l->model[w];
-    double trust = l->trust[w].working, *ratio = l->ratio[w];
-    model->kind->fill(model, reading, ratio);
+    double *ratio = l->ratio[w];
+    model->kind->fill(model, evidence->reading[w], ratio);
     for (int k = 0; k < model->codes; k++)
-        l->table[w][k] = (float)(l->weight[w] * log(trust * ratio[k] + 1.0 - trust));
+        l->table[w][k] = (float)likelihood_log(l, w, ratio[k]);
+    if (l->unmapped[w].states > 0)
+        likelihood_read_unknown(l, w, evidence);
 }
 
 static double likelihood_best(const float *table, int codes)
@@ -126,7 +197,7 @@ void nav_likelihood_read(struct nav_likelihood *l, const struct nav_evidence *ev
         for (int w = l->sensors.first[k]; w < l->sensors.first[k + 1]; w++) {
             l->weight[w] = evidence->weight[w];
             if (l->weight[w] > 0.0) {
-                likelihood_read_one(l, w, evidence->reading[w]);
+                likelihood_read_one(l, w, evidence);
                 l->active[k] = true;
                 l->read[l->reads++] = w;
                 l->ceiling += likelihood_best(l->table[w], l->model[w].codes);

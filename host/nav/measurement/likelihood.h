@@ -11,6 +11,9 @@ struct nav_evidence {
     const double *const *reading; /* [sensors] -> doubles, as the sensor's model reads them */
     const double *weight;         /* [sensors] 0: not read or nothing new; up to 1 */
     struct nav_track *track;      /* [sensors] nav_trust_learn notes there what was expected; NULL: not noted */
+    const double *moved;   /* [sensors] path since the reading before this one, m; NULL: nothing of it is known */
+    const double *unknown; /* [sensors] log-likelihoods where nothing is mapped, as nav_likelihood has them of this
+                              row; NULL: they follow from `moved` */
 };
 
 /* blur_m: standard deviation of a contact's distance over the poses that one look-up stands for. NULL: no memory. */

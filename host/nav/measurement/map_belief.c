@@ -131,7 +131,7 @@ static struct nav_map_suspect map_suspect(const struct nav_likelihood *l, int w,
 {
     const struct nav_model *model = &l->model[w];
     struct nav_map_suspect suspect = {.which = -1};
-    if (model->kind->distance && !(model->met > 0.0 && code == model->codes - 1)) /* nothing is mapped there */
+    if (model->kind->distance && !(l->unmapped[w].states > 0 && code == model->codes - 1)) /* nothing is mapped there */
         suspect = map_suspect_ray(l, w, at, code);
     else if (model->kind->floor && l->map.reported->classes > 1)
         suspect.which = nav_arena_tile(l->map.reported, nav_place_x(at, model->place.x, model->place.y),

@@ -40,7 +40,6 @@ struct nav_model {
     double sigma;                    /* m, of a measured distance, the spread of a pose's cell included */
     double edge;                     /* m, of the end of reach, likewise */
     double *noticed;                 /* object whiskers: [codes] share of contacts that are noticed */
-    double met;                      /* object whiskers: share of contacts on mapped ground; 0: all ground is mapped */
     double temper;                   /* texture whiskers: exponent on a window's likelihood */
     double gap;                      /* running median of log-likelihood between best class and second, 0: none seen */
     double accuracy;                 /* share of windows whose best class is right, as far as is known; 0: not known */
@@ -93,6 +92,10 @@ extern const struct nav_measurement NAV_OWN_MEASUREMENT;     /* a sensor of the 
 /* Direction that a model of NAV_NORMAL_MEASUREMENT expects at a place, robot's frame, rad; NAN: not known. near: as
  * `expect` has it. */
 double nav_normal_direction(const struct nav_model *, const struct nav_arena *near, const struct nav_place *);
+
+/* Likelihood of an object whisker's reading, by that of a broken one, where nothing is mapped: whether something is
+ * within reach is all that is known, and as any ghost's a distance is as likely as another. */
+double nav_range_unmapped(const struct nav_model *, double distance, bool within);
 
 enum { NAV_KINDS = 4 };
 extern const struct nav_measurement *const NAV_MEASUREMENTS[NAV_KINDS];

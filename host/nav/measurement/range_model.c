@@ -1,7 +1,6 @@
 /* Contact distances: noticed with a probability that falls off around the whisker's length, then Gaussian (the paper);
- * ghosts are spread evenly over the whisker; "no contact" is what is left over. On ground that was never mapped there
- * are as many contacts as on that which was, spread as evenly. A broken whisker's distances are taken as ghosts are, 1
- * / length, and its silence as certain. */
+ * ghosts are spread evenly over the whisker; "no contact" is what is left over. A broken whisker's distances are taken
+ * as ghosts are, 1 / length, and its silence as certain. */
 #include "measurement.h"
 
 #include <math.h>
@@ -132,9 +131,13 @@ static void range_fill(struct nav_model *model, const double *reading, double *r
             p = model->length * hit * range_density(model, reading[0] - (k + 0.5) * model->step) + (1.0 - hit) * ghost;
         ratio[k] = fmax(p, LEAST);
     }
-    /* Ground that nobody mapped is as full as what is mapped; as any ghost's a distance is as likely as another. */
-    double met = isfinite(reading[0]) ? model->met : 1.0 - model->met;
-    ratio[model->codes - 1] = model->met > 0.0 ? met : 1.0;
+    ratio[model->codes - 1] = 1.0;
+}
+
+double nav_range_unmapped(const struct nav_model *model, double distance, bool within)
+{
+    double ghost = model->settings->radial.ghost, hit = within ? 1.0 - model->settings->radial.miss : 0.0;
+    return isfinite(distance) ? hit + (1.0 - hit) * ghost : (1.0 - hit) * (1.0 - ghost);
 }
 
 const struct nav_measurement NAV_RANGE_MEASUREMENT = {.name = "range",

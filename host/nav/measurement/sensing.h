@@ -18,6 +18,15 @@ struct nav_trust {
     int codes;
 };
 
+/* What may be at one sensor where nothing is mapped: unmapped.h. */
+struct nav_unmapped {
+    int states;     /* textures, or nothing and something within reach; 0: nothing can be said */
+    double run_m;   /* path over which one thing stays at the sensor, on average */
+    double *share;  /* [states] of the mapped ground */
+    double *now;    /* [states] after the last reading */
+    double *loglik; /* [states] of the present one */
+};
+
 enum { NAV_MAP_THINGS = 32 };
 
 /* Nats for `other` against the mapped texture, less those of the prior. */
@@ -61,17 +70,19 @@ struct nav_likelihood {
     struct nav_model *model; /* [whiskers] their models: as in `sensors` */
     struct nav_obstacles obstacles;
     struct nav_ground ground;
-    float **table;                /* [whiskers][codes] log-likelihoods of the present row, weight and trust applied */
-    double **ratio;               /* [whiskers][codes] what the models gave, see measurement.h */
-    double *weight;               /* [whiskers] of the present row */
-    bool active[NAV_KINDS];       /* whether any sensor of a kind was read */
-    int reads, *read;             /* [reads] sensors that the present row read */
-    double ceiling;               /* log-likelihood of the present row at the codes that suit every sensor best */
-    uint8_t *scratch;             /* [whiskers] */
-    struct nav_trust *trust;      /* [whiskers], see trust.h */
-    const double *const *reading; /* [whiskers] of the row last read */
-    struct nav_track *track;      /* [whiskers] likewise, or NULL */
-    struct nav_map_belief map;    /* what is expected follows it */
+    float **table;                 /* [whiskers][codes] log-likelihoods of the present row, weight and trust applied */
+    double **ratio;                /* [whiskers][codes] what the models gave, see measurement.h */
+    double *weight;                /* [whiskers] of the present row */
+    bool active[NAV_KINDS];        /* whether any sensor of a kind was read */
+    int reads, *read;              /* [reads] sensors that the present row read */
+    double ceiling;                /* log-likelihood of the present row at the codes that suit every sensor best */
+    uint8_t *scratch;              /* [whiskers] */
+    struct nav_trust *trust;       /* [whiskers], see trust.h */
+    struct nav_unmapped *unmapped; /* [whiskers], see unmapped.h */
+    double *unknown;               /* [whiskers] of the present row: log-likelihood where nothing is mapped */
+    const double *const *reading;  /* [whiskers] of the row last read */
+    struct nav_track *track;       /* [whiskers] likewise, or NULL */
+    struct nav_map_belief map;     /* what is expected follows it */
 };
 
 #endif

@@ -31,10 +31,3 @@ const char *nav_prior_fault(const struct nav_arena *arena, const struct nav_prio
     }
     return total > 0.0 && isfinite(total) ? NULL : "the components have no mass, or no end of it";
 }
-
-double nav_problem_hazard(const struct nav_problem *p)
-{
-    static const double unmapped =
-        0.1; /* of the robot's own maps: 3 of 4 drives are lost with all of it, none with this */
-    return p->settings.motion.hazard * (p->arena.unknown > 0 ? unmapped : 1.0);
-}

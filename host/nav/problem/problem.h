@@ -93,8 +93,4 @@ const char *nav_prior_fault(const struct nav_arena *, const struct nav_prior *, 
 }
 #endif
 
-/* The hazard of a row: settings.motion.hazard, or a tenth of it where some ground is not mapped. Readings there are
- * taken as independent, which they are not: any mapped place of the same texture soon explains them better. */
-double nav_problem_hazard(const struct nav_problem *);
-
 #endif

@@ -43,7 +43,7 @@ struct nav_motion_settings {
     double drift_rad; /* heading error of a straight metre, standard deviation */
     double calibrate; /* 1: learns constant errors of the odometry (calibration.h), where the filter can */
     double gaps;      /* 1: estimates the motion of rows that never came (gap.h); 0: takes it as none */
-    double hazard;    /* probability at any row read that the robot has been put to another place, on mapped ground */
+    double hazard;    /* probability at any row read that the robot has been put to another place */
 };
 
 struct nav_grid_settings {

@@ -80,10 +80,30 @@ static void own_fill(const void *self, const double *reading, double *likelihood
         likelihood[k] = CONFUSED[k][(int)reading[0]];
 }
 
-/* Adds what a model makes of a reading, which stands for so much, to the sums of all codes. */
+enum { SENSORS = 8, STATES = 8 };
+
+/* Reads one sensor alone, after so much path. What it says of ground that is not mapped follows from what it said
+ * before. */
+static void read_one(struct nav_likelihood *l, int w, const double *reading, double moved)
+{
+    const double *all[SENSORS] = {NULL};
+    double weight[SENSORS] = {0.0}, path[SENSORS] = {0.0};
+    all[w] = reading;
+    weight[w] = 1.0;
+    path[w] = moved;
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = all, .weight = weight, .moved = path});
+}
+
+static const double MOVED = 0.05;
+
+/* Adds what a model makes of a reading, which stands for so much, to the sums of all codes; nothing is kept of it. */
 static void add(struct nav_likelihood *l, int w, const double *reading, double share, double *sum)
 {
-    l->model[w].kind->fill(&l->model[w], reading, l->ratio[w]);
+    double before[STATES];
+    size_t bytes = (size_t)l->unmapped[w].states * sizeof *before;
+    memcpy(before, l->unmapped[w].now, bytes);
+    read_one(l, w, reading, MOVED);
+    memcpy(l->unmapped[w].now, before, bytes);
     for (int k = 0; k < l->model[w].codes; k++)
         sum[k] += share * l->ratio[w][k];
 }
@@ -139,8 +159,9 @@ static struct nav_box drawn(struct nav_rng *rng)
 /* Every code that is met, and "not known" of every sensor. */
 static void judge_map(struct nav_likelihood *l, struct nav_rng *rng)
 {
-    static double sum[8][NAV_CODES_MOST];
+    static double sum[SENSORS][NAV_CODES_MOST];
     for (int w = 0; w < l->whiskers; w++) {
+        l->trust[w].working = 1.0;
         sum_readings(l, w, sum[w]);
         assert_near(sum[w][l->model[w].codes - 1], 1.0, 0.01);
     }
@@ -171,10 +192,71 @@ static void every_likelihood_is_a_distribution(void **state)
         p.robot.sensors = 1;
         p.settings.texture.temper = 1.0;
         struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.002 * (n % 5));
-        assert_true(l->model[1].met > 0.02 && l->model[1].met < 0.9);
         judge_map(l, &rng);
+        const double said[LEVELS] = {-5.0, 0.0, -3.0, -4.0}, felt = 0.03;
+        read_one(l, 0, said, INFINITY);
+        read_one(l, 1, &felt, INFINITY);
+        judge_map(l, &rng); /* likewise after a reading */
         nav_likelihood_free(l);
     }
+}
+
+/* Where nothing is mapped a whisker stays on one tile for a while, and at what it feels: what it says again is expected
+ * there, what it says anew is not, and after a long way all is as it was. */
+static void readings_of_one_unmapped_thing_count_once(void **state)
+{
+    (void)state;
+    static const uint8_t floor_of[] = {0, 0, 1, 2, 0, 1, 2, 0, 3};
+    const double zero[] = {0.0, -9.0, -9.0}, one[] = {-9.0, 0.0, -9.0}, felt = 0.03, nothing = INFINITY;
+    struct nav_box box[9];
+    struct nav_problem p = room();
+    p.arena = padded(box, 0.35);
+    p.arena.tile = 1.0;
+    p.arena.columns = p.arena.rows = p.arena.classes = 3;
+    p.arena.floor = floor_of;
+    p.settings.texture.temper = 1.0;
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.0);
+    double first, anew, far;
+    /* Of 4, 2 and 2 tiles, each counted once more than it is there. */
+    read_one(l, 0, zero, INFINITY);
+    first = l->unknown[0];
+    assert_near(exp(first), 5.0 / 11.0 * exp((double)l->table[0][0]) + 6.0 / 11.0 * exp((double)l->table[0][1]), 1e-6);
+    read_one(l, 0, zero, 0.02);
+    assert_true(l->unknown[0] > first + 0.6);
+    assert_true((double)l->table[0][0] - l->unknown[0] < 0.1); /* a mapped tile that fits gains next to nothing */
+    read_one(l, 0, one, 0.02);
+    anew = l->unknown[0];
+    assert_true(anew < -0.8);
+    read_one(l, 0, zero, 100.0);
+    far = l->unknown[0];
+    assert_near(far, first, 1e-9);
+    read_one(l, 1, &felt, INFINITY);
+    first = l->unknown[1];
+    assert_near(exp(first), 0.995 * nav_range_unmapped(&l->model[1], felt, true) * l->unmapped[1].share[1], 0.02);
+    read_one(l, 1, &felt, 0.01);
+    assert_true(l->unknown[1] > first + 0.3);
+    read_one(l, 1, &nothing, 0.01);
+    anew = l->unknown[1];
+    read_one(l, 1, &nothing, 0.01);
+    assert_true(l->unknown[1] > anew + 0.3);
+    nav_likelihood_free(l);
+}
+
+/* What the log keeps of a row is read again as it was. */
+static void what_is_given_of_unmapped_ground_is_taken(void **state)
+{
+    (void)state;
+    struct nav_problem p = room();
+    struct nav_likelihood *l = nav_likelihood_new(&p.arena, &p.robot, &p.settings, 0.0);
+    const double said[] = {0.0, -9.0, -9.0}, nowhere = NAN, weight[] = {0.5, 0.0}, unknown[] = {-0.25, 0.0};
+    const double *reading[] = {said, &nowhere};
+    double before = l->unmapped[0].now[0];
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = weight, .unknown = unknown});
+    int last = l->model[0].codes - 1;
+    assert_near((double)l->table[0][last], -0.25, 1e-7);
+    assert_near(0.5 * log(l->trust[0].working * l->ratio[0][last] + 1.0 - l->trust[0].working), -0.25, 1e-9);
+    assert_near(l->unmapped[0].now[0], before, 0.0);
+    nav_likelihood_free(l);
 }
 
 /* A sensor that was not read says the same of every place. */
@@ -199,6 +281,8 @@ int main(void)
         cmocka_unit_test(a_small_patch_weighs_as_much_as_mapped_ground),
         cmocka_unit_test(every_likelihood_is_a_distribution),
         cmocka_unit_test(what_was_not_read_prefers_no_place),
+        cmocka_unit_test(readings_of_one_unmapped_thing_count_once),
+        cmocka_unit_test(what_is_given_of_unmapped_ground_is_taken),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

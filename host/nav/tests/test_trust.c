@@ -104,7 +104,7 @@ static void read_row(struct bench *b, bool left_agrees, bool right_agrees, doubl
 {
     const double right[] = {0.0, -10.0}, wrong[] = {-10.0, 0.0}, none = (double)INFINITY, weight[] = {1.0, 1.0, 1.0};
     const double *reading[] = {left_agrees ? right : wrong, right_agrees ? right : wrong, &none};
-    nav_likelihood_read(b->likelihood, &(struct nav_evidence){reading, weight, b->track});
+    nav_likelihood_read(b->likelihood, &(struct nav_evidence){.reading = reading, .weight = weight, .track = b->track});
     nav_trust_begin(b->likelihood);
     nav_trust_add(b->likelihood, b->codes, mass);
     nav_trust_learn(b->likelihood);

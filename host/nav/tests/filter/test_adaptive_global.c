@@ -40,9 +40,9 @@ static void write(struct belief *b, struct nav_noise noise, const double *textur
 {
     const double nowhere = INFINITY;
     const double *reading[WHISKERS] = {texture, texture, &nowhere, &nowhere, &nowhere};
-    const double weight[WHISKERS] = {texture != NULL, texture != NULL};
+    const double weight[WHISKERS] = {texture != NULL, texture != NULL}, unknown[WHISKERS] = {0.0};
     adaptive_log_write(&b->log, (struct nav_pose){0.0, 0.0, 0.0}, noise,
-                       &(struct nav_evidence){.reading = reading, .weight = weight});
+                       &(struct nav_evidence){.reading = reading, .weight = weight}, unknown);
 }
 
 static void work(struct belief *b)
