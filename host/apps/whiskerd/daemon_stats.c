@@ -34,6 +34,7 @@ void daemon_stats_connected(struct daemon_stats *stats, struct daemon_source *so
     source->has_sequence = false;
     reported->wire_version = identity->wire_version;
     reported->gateware = identity->gateware;
+    reported->usb_mbit = about->usb_mbit;
     memcpy(reported->serial, about->serial, sizeof reported->serial);
     snprintf(reported->firmware, sizeof reported->firmware, "gateware %u, wire %u", identity->gateware,
              identity->wire_version);

@@ -7,7 +7,7 @@
 
 static struct whisker_device_info discovery_describe(libusb_device *found)
 {
-    struct whisker_device_info about = {0};
+    struct whisker_device_info about = {.usb_mbit = usb_mbit(found)};
     libusb_device_handle *handle;
     usb_path(found, about.path, sizeof about.path);
     const int opened = libusb_open(found, &handle);
@@ -65,7 +65,7 @@ bool discovery_present(void)
 static int discovery_try_open(libusb_device *found, const char *serial, libusb_device_handle **handle,
                               struct whisker_device_info *about)
 {
-    *about = (struct whisker_device_info){0};
+    *about = (struct whisker_device_info){.usb_mbit = usb_mbit(found)};
     usb_path(found, about->path, sizeof about->path);
     const int opened = libusb_open(found, handle);
     if (opened != 0) {

@@ -50,6 +50,12 @@ bool usb_is_bridge(libusb_device *candidate, const struct usb_identity *identity
            about.idProduct == identity->product;
 }
 
+uint16_t usb_mbit(libusb_device *device)
+{
+    const int speed = libusb_get_device_speed(device);
+    return speed == LIBUSB_SPEED_HIGH ? 480 : speed == LIBUSB_SPEED_FULL ? 12 : 0;
+}
+
 void usb_path(libusb_device *device, char *path, size_t n)
 {
     uint8_t port[PORTS_MAX];

@@ -22,6 +22,9 @@ int usb_read_identity(struct usb_identity *identity);
 
 bool usb_is_bridge(libusb_device *candidate, const struct usb_identity *identity);
 
+/* Speed of its bus in Mbit/s: 480, 12, or 0: another. */
+uint16_t usb_mbit(libusb_device *device);
+
 /* Fills in where it is plugged in. */
 void usb_path(libusb_device *device, char *path, size_t n);
 

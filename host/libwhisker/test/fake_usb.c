@@ -115,6 +115,12 @@ int libusb_get_device_descriptor(libusb_device *device, struct libusb_device_des
     return 0;
 }
 
+int libusb_get_device_speed(libusb_device *device)
+{
+    (void)device;
+    return fake.speed;
+}
+
 uint8_t libusb_get_bus_number(libusb_device *device)
 {
     (void)device;

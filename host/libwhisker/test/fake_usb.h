@@ -18,6 +18,7 @@ struct fake_usb {
     bool has_hid;
     int open_error, claim_error;
     uint16_t vendor, product; /* in its descriptor; 0: the protocol's */
+    int speed;                /* LIBUSB_SPEED_* of its bus */
     uint8_t identity[16];
     int identity_bytes;
     uint8_t timing[32];

@@ -125,7 +125,9 @@ static void the_bridge_asked_for_is_opened(void **state)
     (void)state;
     struct whisker_identity identity;
     fake.bridges = 3;
+    fake.speed = LIBUSB_SPEED_FULL;
     assert_int_equal(whisker_device_open("0002", &device, &identity), 0);
+    assert_int_equal(whisker_device_about(device)->usb_mbit, 12);
     assert_int_equal(fake.claimed, 1);
     assert_string_equal(fake.hid_path, "1-2.2:1.1"); /* control goes to the same one */
     assert_string_equal(whisker_device_about(device)->serial, "0002");

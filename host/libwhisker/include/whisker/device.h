@@ -85,6 +85,7 @@ int whisker_wire_version(void);
 struct whisker_device_info {
     char serial[WHISKER_SERIAL_BYTES]; /* empty if it could not be read: then `error` says why */
     char path[32];                     /* where it is plugged in, as the kernel writes it: "1-2.4" */
+    uint16_t usb_mbit;                 /* speed of its bus: 480, or 12; 0: not known */
     int error;                         /* 0, DEVICE_ACCESS, DEVICE_GONE, DEVICE_USB */
 };
 
@@ -102,7 +103,7 @@ int whisker_device_list(struct whisker_device_info *list, int room);
  */
 int whisker_device_open(const char *serial, struct whisker_device **device, struct whisker_identity *identity);
 
-/* Serial number and place of an open device; valid until it is closed. */
+/* Serial number, place and speed of an open device; valid until it is closed. */
 const struct whisker_device_info *whisker_device_about(const struct whisker_device *device);
 
 /* Cancels what is under way and closes. NULL is allowed. Does not stop the bridge. */

@@ -31,7 +31,8 @@ struct whisker_daemon_stats {
     int32_t error;           /* why the bridge is not connected, a code of errors.h; 0 if it is */
     uint8_t wire_version;    /* of the bridge, as all below */
     uint8_t gateware;
-    uint8_t reserved[6];
+    uint16_t usb_mbit; /* speed of its bus: 480, or 12; 0: not known */
+    uint8_t reserved[4];
     char serial[WHISKER_SERIAL_BYTES];     /* ended by a zero */
     char firmware[WHISKER_FIRMWARE_BYTES]; /* as a person reads it */
 };

@@ -197,6 +197,7 @@ class DaemonStats:
     error: int
     wire_version: int
     gateware: int
+    usb_mbit: int
     serial: str
     firmware: str
 

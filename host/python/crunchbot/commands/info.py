@@ -146,7 +146,8 @@ def spoken(reported: dict) -> list[str]:
         bad = sum(daemon[f"records_{kind}"] for kind in ("crc", "tick", "usb", "sensor"))
         lanes = ", ".join(map(str, daemon["lanes"])) or "none"
         lost = f"{daemon['frames_missing'] or 'no'} frames lost, {bad or 'no'} records bad"
-        known = f"gateware {daemon['gateware']}, wire version {daemon['wire_version']}"
+        speed = f"{daemon['usb_mbit']} Mbit/s, " if daemon["usb_mbit"] else ""
+        known = f"{speed}gateware {daemon['gateware']}, wire version {daemon['wire_version']}"
         state = f"connected ({known}), lanes {lanes}" if daemon["connected"] else "not connected"
         out += [f"bridge {daemon['serial'] or 'without a serial number'}: {state}; {lost} in {daemon['up_s']:.0f} s"]
     return out + reported["advice"]

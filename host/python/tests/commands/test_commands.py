@@ -97,7 +97,10 @@ def test_info_reports_ring_daemon_and_clock(capsys):
         assert reported["host"]["version"] == __version__ and reported["advice"] == []
         said = run(capsys, "info", "--ring", name)[1].splitlines()
         assert said[1].startswith(f"ring {name}: 300 frames written by process {os.getpid()} of ")
-        assert said[2].startswith("bridge B0042: connected (") and "lanes 0, 2; no frames lost, " in said[2]
+        assert (
+            said[2].startswith("bridge B0042: connected (12 Mbit/s, gateware ")
+            and "lanes 0, 2; no frames lost, " in said[2]
+        )
         assert len(said) == 3, "one or two sentences, and what is plugged in"
 
 

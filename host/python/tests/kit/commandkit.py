@@ -10,7 +10,14 @@ from crunchbot.bridge.ring import Clock, Writer
 from crunchbot.cli import main
 from whisker_protocol import LIMITS, WIRE_VERSION
 
-STATS = {"started_ns": 1, "connected": 1, "wire_version": WIRE_VERSION, "serial": b"B0042", "lane_mask": 0b101}
+STATS = {
+    "started_ns": 1,
+    "connected": 1,
+    "usb_mbit": 12,
+    "wire_version": WIRE_VERSION,
+    "serial": b"B0042",
+    "lane_mask": 0b101,
+}
 
 
 @pytest.fixture(autouse=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crunchbot.tables import TableError
-from crunchbot.touch.texture.model import TextureModel, classify, load, read_recording, read_training
+from crunchbot.touch.texture.model import TextureModel, channel_names, classify, load, read_recording, read_training
 
 RNG = np.random.default_rng(11)
 SPREAD = {"VINYL": 15.0, "SMOOTH": 40.0, "ROUGH": 90.0}
@@ -103,6 +103,22 @@ def test_malformed_recordings_are_one_clear_line(tmp_path, text, complaint):
     path.write_text(text)
     with pytest.raises(TableError, match=complaint):
         read_recording(path)
+
+
+def test_what_stream_prints_is_a_recording_whose_bad_readings_are_missing(tmp_path):
+    path = tmp_path / "r.csv"
+    head = "tick,t_s,sequence,lane0_alpha,lane0_beta,lane0_status,lane3_alpha,lane3_beta,lane3_status"
+    path.write_text(f"{head}\n7,0.0,2,10,20,0,0,0,6144\n8,0.0005,3,11,21,3,31,41,0\n")
+    assert channel_names(path) == ["lane0_alpha", "lane0_beta", "lane3_alpha", "lane3_beta"]
+    t_s, samples = read_recording(path)
+    assert t_s.tolist() == [0.0, 0.0005]
+    np.testing.assert_array_equal(samples, [[10, 20, np.nan, np.nan], [np.nan, np.nan, 31, 41]])
+
+
+def test_columns_of_such_names_that_no_stream_has_are_channels(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("t_s,tick,x_status\n0,1,2\n1,2,3\n")
+    assert read_recording(path)[1].tolist() == [[1, 2], [2, 3]]
 
 
 def test_bytes_that_are_no_text_are_one_clear_line(tmp_path):

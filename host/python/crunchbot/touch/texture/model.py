@@ -194,12 +194,17 @@ def _decide(model: TextureModel, t_s: float, window: np.ndarray) -> Decision:
 
 
 def channel_names(path: str | Path) -> list[str]:
-    """The columns of a CSV recording beside t_s, in order; TableError without any."""
-    return _channels(path, read_columns(path, required=["t_s"]))
+    """The columns of a CSV recording that are channels, in order; TableError without any."""
+    return list(_channels(path, read_columns(path, required=["t_s"])))
 
 
-def _channels(path, columns) -> list[str]:
-    channels = [name for name in columns if name != "t_s"]
+def _channels(path, columns) -> dict[str, str | None]:
+    """Channel -> column that is not 0 where its sample is missing, as `whisker stream` writes them; None: there is none."""
+    streamed = {"tick", "sequence"} <= columns.keys()
+    others = {"t_s", "tick", "sequence"} if streamed else {"t_s"}
+    status = {name for name in columns if streamed and name.endswith("_status")}
+    places = {name: f"{name.rpartition('_')[0]}_status" for name in columns if name not in others | status}
+    channels = {name: place if place in status else None for name, place in places.items()}
     if not channels:
         raise TableError(path, 1, "no channel column beside t_s; name at least one, as in 't_s,x,y'")
     return channels
@@ -212,10 +217,14 @@ def read_recording(
 
     `warn(line)` is called with each fault that does not keep it from being read."""
     text = read_columns(path, required=["t_s"])
-    channels = _channels(path, text)
+    places = _channels(path, text)
+    channels = list(places)
     if order and channels != order and sorted(channels) == sorted(order):
         raise TableError(path, 1, f"columns {', '.join(channels)}; give {', '.join(order)}, as in training")
     t_s, samples = numbers(text["t_s"]), np.column_stack([numbers(text[name]) for name in channels])
+    for channel, place in enumerate(places.values()):
+        if place:
+            samples[numbers(text[place]) != 0, channel] = np.nan
     if len(t_s) > 1 and not (np.diff(t_s[np.isfinite(t_s)]) > 0).any():
         raise TableError(path, 1, "column 't_s' never increases; give each row its time in seconds")
     if order and channels != order and len(channels) == len(order):
