@@ -18,6 +18,7 @@ static struct sensor_result results[BOARD_LANES];
 /* Lanes whose latest frame was damaged: the pair of axes that it chose may not be the one that comes next. It is chosen
  * anew, and the first reading after it is given up. */
 static uint32_t damaged;
+static uint32_t before; /* lanes read in the tick before; of the others nobody knows which conversion was the latest */
 /* Of the present tick: lanes still to conclude, the pair whose answers wait. */
 static struct now {
     struct sensor_reading *readings;
@@ -157,6 +158,10 @@ static void lanes_mend(uint32_t mask)
 void lanes_read(uint32_t mask, struct sensor_reading readings[BOARD_LANES])
 {
     now = (struct now){readings, mask, {BOARD_LANE_NONE, BOARD_LANE_NONE}};
+    for (uint8_t lane = 0; (mask & ~before) >> lane != 0; lane++)
+        if (sensors[lane].kind == SENSOR_TMAG5170 && !(before >> lane & 1u))
+            sensors[lane].sets = TMAG5170_SETS_NONE;
+    before = mask;
     for (uint8_t lane = 0; (mask & damaged) >> lane != 0; lane++)
         if ((mask & damaged) >> lane & 1u)
             tmag5170_again(&sensors[lane], lane);

@@ -10,6 +10,8 @@
 
 #include "sensor.h"
 
+#define TMAG5170_SETS_NONE UINT8_MAX /* sensor.sets: the next reading's conversion is new, whatever its number */
+
 /* Makes the tables; once. */
 void tmag5170_start(void);
 

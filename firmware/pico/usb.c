@@ -76,10 +76,11 @@ static void usb_take(void)
     usb_buffer(DPRAM_BUFFER_OUT0, PACKET | BUFFER_DATA1);
 }
 
-static void usb_confirm(void)
+static bool usb_confirm(void)
 {
     confirming = true;
     usb_send(0, incoming, 0);
+    return true;
 }
 
 static void usb_reply_on(void)
@@ -97,9 +98,8 @@ static bool usb_reply(const uint8_t *bytes, uint32_t n, uint32_t wanted)
     reply_left = n < wanted ? n : wanted;
     reply_short = n < wanted;
     if (wanted == 0)
-        usb_confirm();
-    else
-        usb_reply_on();
+        return usb_confirm();
+    usb_reply_on();
     return true;
 }
 
@@ -108,12 +108,6 @@ static bool usb_reply_byte(uint32_t value, const struct setup *s)
     answer[0] = (uint8_t)value;
     answer[1] = 0;
     return usb_reply(answer, s->kind == REQUEST(0x80u, 8u) || s->kind >= REQUEST(0x81u, 2u) ? 1 : 2, s->length);
-}
-
-static bool usb_done(void)
-{
-    usb_confirm();
-    return true;
 }
 
 void usb_stream(void)
@@ -156,15 +150,15 @@ static bool usb_describe(const struct setup *s)
     return false;
 }
 
+/* Also of the same value, it ends the run: to a host by USB/IP it is all that a reset comes to. */
 static bool usb_configure(uint8_t value)
 {
-    if (value != configuration)
-        stream_halt();
+    stream_halt();
     configuration = value;
     busy = false;
     usb_fresh(1);
     usb_fresh(2);
-    return usb_done();
+    return usb_confirm();
 }
 
 /* 1 or 2, if that is an endpoint of the present configuration; 0: the control endpoint; ENDPOINTS: none. */
@@ -187,7 +181,7 @@ static bool usb_halt(const struct setup *s, bool on)
     } else if (endpoint > 0) {
         usb_fresh(endpoint);
     }
-    return usb_done();
+    return usb_confirm();
 }
 
 static bool usb_is_interface(const struct setup *s)
@@ -209,7 +203,7 @@ static bool usb_standard(const struct setup *s)
         return usb_halt(s, s->kind == REQUEST(0x02u, 3u));
     case REQUEST(0x00u, 5u): /* SET_ADDRESS */
         new_address = (uint8_t)s->value;
-        return s->value < ADDRESSES && s->index == 0 && s->length == 0 && !configuration && usb_done();
+        return s->value < ADDRESSES && s->index == 0 && s->length == 0 && !configuration && usb_confirm();
     case REQUEST(0x80u, 6u): /* GET_DESCRIPTOR */
     case REQUEST(0x81u, 6u):
         return usb_describe(s);
@@ -224,7 +218,7 @@ static bool usb_standard(const struct setup *s)
         if (!usb_is_interface(s) || s->length != 0)
             return false;
         usb_fresh(s->index + 1u);
-        return usb_done();
+        return usb_confirm();
     default:
         return false;
     }
@@ -251,7 +245,7 @@ static bool usb_class(const struct setup *s)
         return usb_reply_byte(idle_rate, s);
     case REQUEST(0x21u, 10u): /* SET_IDLE */
         idle_rate = (uint8_t)(s->value >> 8);
-        return s->length == 0 && usb_done();
+        return s->length == 0 && usb_confirm();
     default:
         return false;
     }

@@ -20,6 +20,9 @@ export function wandering(lane) {
   };
 }
 
+// The angle that a record gives for these components, with fractions of a count.
+export function counts(side, axis) { return Math.max(0, Math.min(65535, 32768 + Math.atan(side / axis) * 65536 / Math.PI)); }
+
 class Sensor {
   constructor(field) {
     this.field = field;

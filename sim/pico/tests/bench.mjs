@@ -2,7 +2,7 @@
 import fs from 'node:fs';
 import { Board } from '../board.mjs';
 import { Host } from '../host.mjs';
-import { Mlx90393, Tmag5170, wandering } from '../sensors.mjs';
+import { Mlx90393, Tmag5170, counts, wandering } from '../sensors.mjs';
 
 export const MS = 1e6, LANES = 28, FRAME = 256, VERSION = 2;
 // Counts: what the firmware's angle may be off by; a conversion beside it is hundreds off.
@@ -70,8 +70,6 @@ export function decode(frame) {
   }
   return { last: b[3] & 1, tick: b.readUInt32LE(4), time: b.readBigUInt64LE(8), sequence: b.readUInt32LE(16), dropped: b.readUInt32LE(20), mask: b.readUInt32LE(24), usb: b.readUInt16LE(29), lanes };
 }
-
-export function counts(side, axis) { return Math.max(0, Math.min(65535, 32768 + Math.atan(side / axis) * 65536 / Math.PI)); }
 
 // Holds the frames of one run against the sensors' own logs. Each good reading must be one conversion's, each conversion's once,
 // in order: its place in the log is its tick's, from the first good one on.

@@ -48,6 +48,27 @@ const CHECKS = {
       want(frames.length > 3 && frames.length < 8, `frames ${frames.length}`);
     }
   },
+  lanes_that_were_idle_begin_with_a_good_reading() {
+    const bench = new Bench(image, tmags(4));
+    bench.enumerate();
+    bench.board.run(60 * MS);
+    const frames = [];
+    bench.stream((raw) => frames.push(decode(raw)));
+    for (let idle = 1; idle < 18; idle++) { // conversions are numbered modulo 8
+      same(bench.control(1, { mask: 3 }), null, 'start');
+      bench.board.run(2 * MS);
+      same(bench.control(1, { mask: 15 }), null, 'more lanes');
+      bench.board.run(2 * MS);
+      same(bench.control(1, { mask: 3 }), null, 'fewer');
+      bench.board.run(idle * MS / 2);
+      same(bench.control(1, { mask: 15 }), null, 'more again');
+      bench.board.run(2 * MS);
+      same(bench.control(0, { mask: 3 }), null, 'stop');
+      bench.board.run(1.2 * MS + idle * MS / 2);
+      const found = new Set(frames.splice(0).flatMap((f) => f.lanes.map((lane) => lane.code)));
+      same([...found].filter((code) => code !== CODE.off), [CODE.ok], `codes after ${idle} ticks`);
+    }
+  },
   layouts_of_a_pair_of_axes() {
     for (const order of ['maker', 'plain', 'sheet'])
       for (const inverted of [0, 1]) {
@@ -250,6 +271,19 @@ const CHECKS = {
     run.bench.board.run(20 * MS);
     same([run.frames.filter((x) => x.last).length, run.frames[f.findIndex((x) => x.last) + 1].tick], [2, 0], 'second run');
     regular(run);
+  },
+  a_configuration_ends_the_run_the_same_one_too() {
+    const run = started(tmags(1), { mask: 1 });
+    run.bench.board.run(10 * MS);
+    run.bench.host.bulk.length = run.bench.host.toggles[1] = 0;
+    same(run.bench.request([0, 9, 1, 0, 0, 0, 0, 0]).why, null, 'configuration');
+    const frames = [];
+    run.bench.stream((raw) => frames.push(decode(raw)));
+    run.bench.board.run(10 * MS);
+    same([frames.length, run.bench.get(1, 16).bytes[2]], [0, 0], 'frames and run after it');
+    same(run.bench.control(1, run.settings), null, 'start');
+    run.bench.board.run(10 * MS);
+    same([frames[0]?.tick, run.bench.host.errors], [0, []], 'first frame, errors of the bus');
   },
   start_of_frame_numbers() {
     const run = started(tmags(1), { mask: 1 });
