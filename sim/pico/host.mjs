@@ -76,6 +76,8 @@ export class Host {
 
   buffer(offset) { return this.board.mcu.usbDPRAMView.getUint32(offset, true); }
   stalls(offset) { return (this.buffer(offset) & STALL) !== 0 && (offset > 0x84 || (this.usb.epStallArm & (offset === 0x80 ? 1 : 2)) !== 0); }
+  offers(endpoint) { return (this.buffer(0x80 + 8 * endpoint) & AVAILABLE) !== 0; }
+  isAsked() { return this.now != null || this.queue.length > 0; } // a request of the control endpoint is under way
   addressed() { return this.address === (this.usb.addrEndp & 0x7f); }
 
   // IN: bytes, null for NAK or no answer, 'stall'.

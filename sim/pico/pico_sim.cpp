@@ -158,9 +158,12 @@ class Bridge
             const Result result = board_.receive(data);
             const auto found = open_.find(result.id);
             if (found != open_.end()) {
-                found->second.status = result.status;
-                found->second.data = data;
-                ended.push_back(found->second);
+                Urb &urb = found->second;
+                urb.status = result.status;
+                if (urb.kind != UrbKind::CONTROL || urb.setup.to_host()) {
+                    urb.data = data; // else it stays what the host sent
+                }
+                ended.push_back(urb);
                 open_.erase(found);
             }
         }

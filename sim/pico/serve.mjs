@@ -1,13 +1,15 @@
-// serve.mjs IMAGE LANES PACE FIELDS: the executed board for whisker-pico-sim: transfers in on descriptor 3, their results on 4.
-// Its time goes at PACE of the wall's, or slower; it waits for a host that reads frames and has not asked for the next yet.
+// serve.mjs IMAGE LANES PACE FIELDS [LOG]: the executed board for whisker-pico-sim: transfers in on descriptor 3, their
+// results on 4. In LOG a record for each conversion of a sensor: lane, its pulse (32 bits each), the angles it shows
+// (two floats, counts).
+// Its time goes at PACE of the wall's, or slower; it stands still while a packet of frames is there and no program reads.
 import fs from 'node:fs';
 import { Board } from './board.mjs';
 import { Host } from './host.mjs';
-import { Tmag5170 } from './sensors.mjs';
+import { Tmag5170, counts } from './sensors.mjs';
 
-const [image, lanes, pace, pipe] = process.argv.slice(2);
-const CONTROL = 0, BULK = 1, CANCEL = 2, RESET = 3, HEAD = 24, EPIPE = -32, EPROTO = -71;
-const SLICE_NS = 1e6, HOST_GONE_MS = 200; // without a read for so long no host waits for frames
+const [image, lanes, pace, pipe, log] = process.argv.slice(2);
+const CONTROL = 0, BULK = 1, CANCEL = 2, RESET = 3, HEAD = 24, EPIPE = -32, EPROTO = -71, FRAMES = 1;
+const SLICE_NS = 1e6;
 
 // The world's angles of each pulse, read from FIELDS as they are needed: counts of 180 degrees / 65536 from 0x8000, noise
 // and all (sim/world/sensor_noise.c), as the field of a magnet of FIELD_MT.
@@ -28,8 +30,21 @@ function fieldOf(lane) {
 }
 
 const board = new Board(fs.readFileSync(image), Array.from({ length: 16 }, (_, n) => (n < +lanes ? new Tmag5170(() => fieldOf(n)) : null)));
+let conversions = [];
+if (log) {
+  board.sensors.forEach((sensor, lane) => {
+    if (sensor) sensor.ready = (c) => { const [x, y, z] = sensor.shown(c); conversions.push([lane, board.pulses, counts(x, z), counts(y, z)]); Tmag5170.prototype.ready.call(sensor, c); };
+  });
+  fs.writeFileSync(log, '');
+}
+function keep() {
+  const bytes = Buffer.alloc(16 * conversions.length);
+  conversions.forEach(([lane, pulse, alpha, beta], i) => { bytes.writeUInt32LE(lane, 16 * i); bytes.writeUInt32LE(pulse, 16 * i + 4); bytes.writeFloatLE(alpha, 16 * i + 8); bytes.writeFloatLE(beta, 16 * i + 12); });
+  if (log) fs.appendFileSync(log, bytes);
+  conversions = [];
+}
 const host = new Host(board), reads = new Map();
-let address = 0, heard = Buffer.alloc(0), readAt = -Infinity;
+let address = 0, heard = Buffer.alloc(0);
 
 function tell(id, why, bytes) {
   const head = Buffer.alloc(12);
@@ -48,7 +63,7 @@ function reset(id) {
 }
 function take(kind, id, length, setup, data) {
   if (kind === CONTROL) host.control(setup, data, (why, bytes) => tell(id, why, bytes));
-  else if (kind === BULK) reads.set(id, host.read(length, (why, bytes) => { reads.delete(id); readAt = Date.now(); tell(id, why, bytes); }));
+  else if (kind === BULK) reads.set(id, host.read(length, (why, bytes) => { reads.delete(id); tell(id, why, bytes); }));
   else if (kind === CANCEL && reads.has(id)) { host.cancel(reads.get(id)); reads.delete(id); }
   else if (kind === RESET) reset(id);
 }
@@ -68,9 +83,9 @@ reset(null);
 let wall = performance.now(), time = board.mcu.clock.nanos;
 (function go() {
   const due = (performance.now() - wall) * 1e6 * +pace - (board.mcu.clock.nanos - time);
-  const waits = reads.size === 0 && Date.now() - readAt < HOST_GONE_MS;
+  const waits = reads.size === 0 && host.offers(FRAMES) && !host.isAsked();
   if (waits || due > 20 * SLICE_NS) { wall = performance.now(); time = board.mcu.clock.nanos; }
-  if (!waits && due > 0) board.run(SLICE_NS);
+  if (!waits && due > 0) { board.run(SLICE_NS); keep(); }
   if (board.drive) process.exit(0); // it is a drive now
   due > 0 && !waits ? setImmediate(go) : setTimeout(go, 1);
 })();

@@ -5,6 +5,7 @@ import fcntl
 import itertools
 import os
 import re
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "protocol"))
+sys.path[:0] = [str(ROOT / "protocol"), str(ROOT / "tests")]
 from guest_talk import (  # noqa: E402
     HOST,
     PLUG_S,
@@ -26,18 +27,25 @@ from guest_talk import (  # noqa: E402
     detach,
     require,
 )
+from pico.readings import Log  # noqa: E402
 
-from whisker_protocol import FRAME_BYTES, LIMITS, REPORTS, WIRE_VERSION, decode_frame  # noqa: E402
+from whisker_protocol import FRAME_BYTES, LANES, LIMITS, REPORTS, WIRE_VERSION, decode_frame  # noqa: E402
 
+PICO_LANES = 8
 LONG_RUN_FRAMES = 20000
 SHORT_RUN_FRAMES = 2000
 RING = "kernel"
+FRAMES_FILE = "/run/frames-{}"  # of a reader of so many
 PYUSB, FREE = "pyusb", "free"  # the argument that makes this program the one that pyusb(), or free_run(), runs
 FREE_FRAMES = 128
 MICROFRAMES, PER_TICK = 1 << 14, 4
 FINIT_MODULE, DELETE_MODULE = 313, 176  # system calls of x86-64
 USBTEST_TIMES, USBTEST_QUEUED = 20, 16
 LINK = ["--sck-divider", "6", "--word-gap", "30", "--sample-point", "5"]
+SPEEDS = {"Whisker bridge": "480", "Whisker Pico": "12"}  # Mbit/s, by what the device says it is
+KEPT = struct.Struct(
+    f"<Q{4 * LANES}H"
+)  # a frame as ring_probe keeps it: tick, then alpha, beta, status, 0 of each lane
 IDENTITY = f"{LIMITS['usb_vendor_id']:04x}:{LIMITS['usb_product_id']:04x}"
 MICROSOFT_OS_20 = "{d8dd60df-4589-4cc7-9cd2-659d9e648a9f}"  # the platform capability by which Windows picks its driver
 # What a kernel says when it does not like a device.
@@ -49,11 +57,11 @@ COMPLAINT = re.compile(
 
 
 class BridgeChecks(Checks):
-    """Checks with the programs of a build."""
+    """Checks with the programs of a build, on a bridge that has so many lanes."""
 
-    def __init__(self, talk: Talk, build: Path):
+    def __init__(self, talk: Talk, build: Path, lanes: int = LANES):
         super().__init__(talk)
-        self.build = build
+        self.build, self.lanes = build, range(lanes)
 
     def program(self, name: str) -> str:
         """Path of a program of the build."""
@@ -85,13 +93,15 @@ def await_state(there: bool) -> None:
 
 
 def enumerates(_: Checks) -> str:
-    """The kernel finds the device at high speed and binds its HID driver."""
+    """The kernel finds the device at its speed and binds its HID driver."""
     await_state(True)
-    speed = (device() / "speed").read_text().strip()
+    product, speed = ((device() / name).read_text().strip() for name in ("product", "speed"))
     driver = (next(device().glob("*:1.1")) / "driver").resolve().name
-    require(speed == "480", f"speed {speed} Mbit/s, not 480")
+    require(speed == SPEEDS[product], f"speed {speed} Mbit/s, not {SPEEDS[product]}")
     require(driver == "usbhid", f"driver {driver}, not usbhid")
-    return f"{(device() / 'product').read_text().strip()} at {speed} Mbit/s, {driver} bound, Linux {Path('/proc/sys/kernel/osrelease').read_text().strip()}"
+    return (
+        f"{product} at {speed} Mbit/s, {driver} bound, Linux {Path('/proc/sys/kernel/osrelease').read_text().strip()}"
+    )
 
 
 def lsusb(_: Checks) -> str:
@@ -100,7 +110,13 @@ def lsusb(_: Checks) -> str:
     Classes by number (255: vendor specific, 3: HID): their names come from udev's database, which not every system has.
     """
     done = subprocess.run(["lsusb", "-v", "-d", IDENTITY], capture_output=True, text=True, timeout=PROGRAM_S)
-    wanted = ["Whisker bridge", "CrunchBot", "bInterfaceClass 255 ", "bInterfaceClass 3 ", "HID Device Descriptor"]
+    wanted = [
+        (device() / "product").read_text().strip(),
+        "CrunchBot",
+        "bInterfaceClass 255 ",
+        "bInterfaceClass 3 ",
+        "HID Device Descriptor",
+    ]
     wanted += ["EP 1 IN", "EP 2 IN", "Binary Object Store Descriptor", MICROSOFT_OS_20]
     reported = re.sub(r" +", " ", done.stdout)
     missing = [text for text in wanted if text not in reported]
@@ -263,7 +279,8 @@ def pyusb_run(bridge, run: Callable) -> int:
 @contextmanager
 def daemon(checks: BridgeChecks):
     """whiskerd on the bridge, stopped as a service manager stops it."""
-    words = [checks.program("whiskerd"), "--ring", RING, "--wait", *LINK]
+    mask = str((1 << len(checks.lanes)) - 1)
+    words = [checks.program("whiskerd"), "--ring", RING, "--wait", "--lane-mask", mask, *LINK]
     with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as process:
         try:
             yield process
@@ -275,7 +292,7 @@ def daemon(checks: BridgeChecks):
 
 def read_ring(checks: BridgeChecks, frames: int, cuts: int = 0, at_first_thousand: Callable = lambda: None) -> str:
     """A reader's own account of so many frames, every one in its place."""
-    words = [checks.program("kernel_ring_probe"), RING, str(frames), str(cuts)]
+    words = [checks.program("kernel_ring_probe"), RING, str(frames), str(cuts), FRAMES_FILE.format(frames)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as reader:
         line = ""
         for line in reader.stdout:
@@ -376,9 +393,31 @@ def free_daemon(checks: BridgeChecks) -> str:
         return read_ring(checks, FREE_FRAMES)
 
 
-def main() -> None:
-    """All checks over USB/IP."""
-    talk = Talk()
+def readings(checks: BridgeChecks) -> str:
+    """Every reading that readers of the ring got is what the sensor's model logged of its tick."""
+    log = Log(Path(checks.talk.ask("log")))
+    files = [Path(FRAMES_FILE.format(frames)) for frames in (SHORT_RUN_FRAMES, 2 * SHORT_RUN_FRAMES, LONG_RUN_FRAMES)]
+    compared = []
+    for file in files:
+        rows = KEPT.iter_unpack(file.read_bytes())
+        frames = ((tick, [lanes[at : at + 3] for at in range(0, len(lanes), 4)]) for tick, *lanes in rows)
+        compared.append(log.compare(frames, checks.lanes))
+    return f"{' + '.join(map(str, compared))} readings"
+
+
+def pico(talk: Talk) -> None:
+    """The checks of the Pico, whose sensors have logged what they showed."""
+    checks = BridgeChecks(talk, Path(sys.argv[1]), PICO_LANES)
+    # A reset comes after those that leave frames unread.
+    for check in (usbip_attach, enumerates, lsusb, usbtest, hidapi_hidraw, hidapi_libusb, libusb_reset, libusb_stream):
+        checks.run(f"pico {check.__name__.removeprefix('usbip_')}", check)
+    for check in (libusb_stall, libusb_halt, libusb_cancel, daemon_short, replug, daemon_long, readings, usbip_detach):
+        checks.run(f"pico {check.__name__.removeprefix('usbip_')}", check)
+    checks.run("pico no_complaint", no_complaint)
+
+
+def bridge(talk: Talk) -> None:
+    """The checks of the Verilated bridges."""
     checks = BridgeChecks(talk, Path(sys.argv[1]))
     for check in (usbip_attach, enumerates, lsusb, usbtest, libusb_stream, libusb_stall, libusb_halt, libusb_cancel):
         checks.run(check.__name__.removeprefix("usbip_"), check)
@@ -390,6 +429,12 @@ def main() -> None:
     for check in (free_attach, enumerates, free_run, free_daemon):
         checks.run(f"free {check.__name__.removeprefix('free_')}", check)
     checks.run("no_complaint", no_complaint)
+
+
+def main() -> None:
+    """All checks of a guest over USB/IP."""
+    talk = Talk()
+    pico(talk) if sys.argv[2] == "pico" else bridge(talk)
     for line in kernel_log():
         talk.say("log", line)
     talk.say("end")

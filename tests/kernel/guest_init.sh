@@ -16,6 +16,6 @@ mkdir -p /host/dev/shm /host/dev/pts
 mount -t tmpfs shm /host/dev/shm
 mount -t tmpfs run /host/run
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/run TMPDIR=/run PYTHONDONTWRITEBYTECODE=1
-read -r checks build </job
-chroot /host /usr/bin/python3 "$checks" "$build" >/host/dev/ttyS0 2>&1
+read -r checks build name </job
+chroot /host /usr/bin/python3 "$checks" "$build" "$name" >/host/dev/ttyS0 2>&1
 poweroff -f

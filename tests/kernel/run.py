@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """A stock Linux kernel meets the simulated bridge, and systemd the services: `make test-kernel`.
 
-Boots Debian's kernel in QEMU (software emulation) twice. The first guest gets the Verilated bridge over USB/IP, and
-runs lsusb, libusb, hidapi, pyusb and whiskerd (guest_checks.py). The second is a Debian with systemd in which the project
-is installed, with the bridge and two Creates (guest_services.py). One line per check, "ok NAME" or "FAILED NAME"; the
+Boots Debian's kernel in QEMU (software emulation) three times. The first guest gets the Verilated bridge over USB/IP, and
+runs lsusb, libusb, hidapi, pyusb and whiskerd (guest_checks.py). The second gets the executed Pico, whose frames are held
+against its sensors' log. The third is a Debian with systemd in which the project is installed, with the bridge and two Creates (guest_services.py). One line per check, "ok NAME" or "FAILED NAME"; the
 last line is "N passed, N failed". Exit code 1 if anything failed, 2 if something is missing. Logs: build/kernel.
 """
 
@@ -18,13 +18,13 @@ from image import MissingError, check_tools
 
 from crunchbot.errors import UserError
 
-GUESTS = {"bridge": bridge_guest.run, "services": services_guest.run}
+GUESTS = {"bridge": bridge_guest.run, "pico": bridge_guest.run_pico, "services": services_guest.run}
 
 
 def main() -> int:
     """Run them; the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("guests", nargs="*", metavar="GUEST", help=f"only these: {', '.join(GUESTS)} (both)")
+    parser.add_argument("guests", nargs="*", metavar="GUEST", help=f"only these: {', '.join(GUESTS)} (all)")
     chosen = parser.parse_args().guests or list(GUESTS)
     if unknown := set(chosen) - set(GUESTS):
         parser.error(f"no guest {', '.join(sorted(unknown))}; there are {', '.join(GUESTS)}")
