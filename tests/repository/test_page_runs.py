@@ -74,6 +74,7 @@ WITH_BRIDGE = {
     "whisker doctor": " frames in ",
     "whisker top --scene scenes/mine --once": "lane",
     "whisker stream --lanes 0,1 --frames 16000": "",
+    "whisker stream --lanes 0 --frames 8000": "",
     "whisker record drive.mcap --seconds 60 --scene scenes/robot": "frames",
     "whisker replay drive.mcap --ring replayed --speed 2": "frames",
     "whisker-view --open": FOREVER,
