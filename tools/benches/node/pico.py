@@ -14,6 +14,9 @@ from .. import store
 ROOT = Path(__file__).resolve().parents[3]
 IMAGE = ROOT / "firmware/images/pico/pico.bin"
 SCRIPTS = ROOT / "sim/pico/tests"
+# All that a piece follows from.
+INPUTS = [f"sim/pico/{name}" for name in ("board.mjs", "host.mjs", "sensors.mjs", "package-lock.json")]
+INPUTS += [f"sim/pico/tests/{name}.mjs" for name in ("bench", "soak", "faults")] + ["firmware/images/pico/pico.bin"]
 FRAMES, FAULTS = 1_000_000, 10_000
 FRAMES_A_PIECE, FAULTS_A_PIECE = 50_000, 500
 BAD = ("lost", "altered", "doubled", "errors", "wrong")
@@ -47,7 +50,7 @@ def added(total: dict, found: dict) -> dict:
 
 def run(build: Path, frames: int = FRAMES, faults: int = FAULTS) -> None:
     """Goes on until so many are counted; SystemExit names what was not clean. `build` is not needed."""
-    cache = store.kept("pico", "sim/pico", "firmware/images/pico")
+    cache = store.kept("pico", *INPUTS)
     soak: dict = {}
     for number in range(-(-frames // FRAMES_A_PIECE)):
         found = store.once(
