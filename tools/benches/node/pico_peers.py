@@ -12,15 +12,33 @@ FIRMWARE = ROOT / "firmware/pico"
 SCRIPT, IMAGE = ROOT / "sim/pico/tests/peers.mjs", ROOT / "firmware/images/pico/pico.bin"
 # Headers that the drivers include: all of them are the one shim.
 ARDUINO = ("Arduino.h", "Adafruit_I2CDevice.h", "Adafruit_SPIDevice.h", "Adafruit_Sensor.h")
-ZEPHYR = [f"zephyr/{name}.h" for name in ("device", "devicetree", "kernel", "drivers/gpio", "drivers/sensor", "drivers/spi")]
-ZEPHYR += [f"zephyr/{name}.h" for name in ("logging/log", "pm/device", "sys/__assert", "sys/byteorder", "sys/crc", "sys/util")]
+ZEPHYR = [
+    f"zephyr/{name}.h" for name in ("device", "devicetree", "kernel", "drivers/gpio", "drivers/sensor", "drivers/spi")
+]
+ZEPHYR += [
+    f"zephyr/{name}.h" for name in ("logging/log", "pm/device", "sys/__assert", "sys/byteorder", "sys/crc", "sys/util")
+]
 COMMON = "-mcpu=cortex-m0plus -mthumb -O3 -w -ffreestanding -fno-builtin -fno-common -ffunction-sections -c"
 CPP = "-std=c++17 -fno-exceptions -fno-rtti -fno-threadsafe-statics"
 LINK = "-mcpu=cortex-m0plus -mthumb -nostdlib -Wl,--gc-sections,--build-id=none"
 # Row: shim's source, its header, headers it stands for, options, the driver's file, the sensor of the emulator.
 PEERS = {
-    "Adafruit_MLX90393, as it begins": ("adafruit.cpp", "arduino_shim.h", ARDUINO, CPP, "Adafruit_MLX90393.cpp", "mlx90393"),
-    "Adafruit_MLX90393, fastest": ("adafruit.cpp", "arduino_shim.h", ARDUINO, f"{CPP} -DFAST", "Adafruit_MLX90393.cpp", "mlx90393"),
+    "Adafruit_MLX90393, as it begins": (
+        "adafruit.cpp",
+        "arduino_shim.h",
+        ARDUINO,
+        CPP,
+        "Adafruit_MLX90393.cpp",
+        "mlx90393",
+    ),
+    "Adafruit_MLX90393, fastest": (
+        "adafruit.cpp",
+        "arduino_shim.h",
+        ARDUINO,
+        f"{CPP} -DFAST",
+        "Adafruit_MLX90393.cpp",
+        "mlx90393",
+    ),
     "Zephyr tmag5170": ("zephyr.c", "zephyr_shim.h", ZEPHYR, "-std=gnu11", "tmag5170.c", "tmag5170"),
 }
 OURS = {"this firmware, one MLX90393": (1, "mlx90393", 120000), "this firmware, eight TMAG5170": (8, "tmag5170", 30000)}
@@ -59,7 +77,9 @@ def measured(*words) -> dict:
 
 def rows(fetched: Path | None) -> dict[str, dict | str]:
     """By driver: samples a second and instructions a sample; of a peer that is not there: "not run"."""
-    found: dict[str, dict | str] = {name: measured(IMAGE, kind, lanes, period) for name, (lanes, kind, period) in OURS.items()}
+    found: dict[str, dict | str] = {
+        name: measured(IMAGE, kind, lanes, period) for name, (lanes, kind, period) in OURS.items()
+    }
     for name, (*_, file, sensor) in PEERS.items():
         if fetched is None or not (fetched / file).is_file():
             found[name] = "not run"
