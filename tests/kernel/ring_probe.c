@@ -1,7 +1,7 @@
-/* A reader of whiskerd's ring for the guest: so many frames, each in its place, no record of a lane in use bad but those
- * of nodes that start. usage: ring_probe RING FRAMES [CUTS [FILE]]. CUTS: how often the bridge goes and comes back
- * meanwhile (0). FILE: gets each frame's tick, in 8 bytes, and its lanes as they lie in the ring. Says how far it is
- * after every thousand. */
+/* A reader of whiskerd's ring for the guest: so many frames, each in its place, no record of a lane in use bad but
+ * those of nodes that start. usage: ring_probe RING FRAMES [CUTS [FILE]]. CUTS: how often the bridge goes and comes
+ * back meanwhile (0). FILE: gets each frame's tick, in 8 bytes, and its lanes as they lie in the ring. Says how far it
+ * is after every thousand. */
 #include <inttypes.h>
 #include <string.h>
 

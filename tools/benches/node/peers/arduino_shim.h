@@ -7,8 +7,10 @@
 #define SENSOR_TYPE_MAGNETIC_FIELD 2
 
 typedef bool boolean;
-struct TwoWire {};
-struct SPIClass {};
+struct TwoWire {
+};
+struct SPIClass {
+};
 inline TwoWire Wire;
 inline SPIClass SPI;
 

@@ -6,8 +6,11 @@
 void peer_main(void)
 {
     static struct tmag5170_data data;
-    static const struct tmag5170_dev_config config = {
-        .magnetic_channels = 7, .x_range = 2, .y_range = 2, .z_range = 2, .operating_mode = TMAG5170_ACTIVE_TRIGGER_MODE};
+    static const struct tmag5170_dev_config config = {.magnetic_channels = 7,
+                                                      .x_range = 2,
+                                                      .y_range = 2,
+                                                      .z_range = 2,
+                                                      .operating_mode = TMAG5170_ACTIVE_TRIGGER_MODE};
     const struct device device = {&config, &data};
     struct sensor_value values[3];
     if (tmag5170_init(&device) != 0)
