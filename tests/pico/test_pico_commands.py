@@ -1,10 +1,11 @@
-"""A user's commands on the executed Pico: from whiskers that sweep floors, through firmware, USB and ring."""
+"""A user's commands on the executed Pico: from whiskers that sweep floors and meet a post, through firmware, USB and ring."""
 
 import json
 import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +15,17 @@ from pico.stage import staged
 from websockets.sync.client import connect
 
 from crunchbot.bridge.ring import Reader
-from crunchbot_lab.signals.recordings import surface_drive
+from crunchbot_lab.signals.recordings import radial_contacts, surface_drive
 from crunchbot_lab.simulation.scenes import make_scene
 from whisker_protocol import CODES, STATUS_CODE_SHIFT
 
-LANES, WAIT_S = 6, 3600.0  # a reader waits for frames, not for the clock
-FLOOR = 0  # lane
+LANES, WAIT_S, POLL_S = 6, 3600.0, 0.05  # a reader waits for frames, not for the clock
+FLOOR, OBJECT = 0, 2  # lanes
 SEED, FRAMES = 4, 2000
 NOISE = 17.0  # counts of 0.1 mT at 60 mT
 SPEED_M_S, DRIVES, SURFACES = 0.1, 3, ("ROUGH", "SMOOTH")
 STRAIGHT = ((1.0, 0.0, 60.0),)
+RADII_MM, REPEATS, WITHIN_MM = (90.0, 110.0, 130.0), 2, 10.0
 
 
 @pytest.fixture(scope="module")
@@ -121,3 +123,26 @@ def test_textures_are_trained_on_its_recordings_and_recognised(board, scene, tmp
         lines = said("texture", "classify", "--json", tmp_path / "texture.json", tmp_path / "new.csv").splitlines()
         answers = [json.loads(line)["label"] for line in lines]
         assert answers.count(surface) > len(answers) / 2, answers
+
+
+def test_contacts_are_calibrated_on_it_and_their_radii_estimated(board, scene, tmp_path):
+    field, ring, _ = board
+    contacts = radial_contacts(scene, "object_1", SEED, REPEATS, radii_mm=RADII_MM)
+    radii = ",".join(f"{radius:g}" for radius in RADII_MM)
+    rests = [np.tile(contact.counts[:100], (10, 1)) for contact in contacts]  # between two the plug comes back to rest
+    field.play(OBJECT, rests[0], forever=True)
+    words = ["--out", tmp_path / "cal", "--rest-seconds", "0.3", "--lane", OBJECT, "--radii", radii]
+    with started("calibrate", "--ring", ring, "--yes", "--repeats", REPEATS, *words) as calibrate:
+        while not (tmp_path / "cal/lane2.csv").exists() and calibrate.poll() is None:
+            time.sleep(POLL_S)  # until it has measured rest
+        field.play(
+            OBJECT, np.concatenate([p for pair in zip(rests, contacts, strict=True) for p in (pair[0], pair[1].counts)])
+        )
+        field.play(OBJECT, rests[-1], forever=True)
+        out, err = calibrate.communicate()
+    assert calibrate.returncode == 0 and f"{len(contacts)} contacts, places left out" in out, err
+    table = tmp_path / "cal/lane2.csv"
+    said("radial", "fit", table, "--out", tmp_path / "radial.json")
+    lines = said("radial", "predict", "--json", tmp_path / "radial.json", table).splitlines()
+    found = [json.loads(line)["radius_mm"] for line in lines]
+    assert found == pytest.approx([contact.radius_mm for contact in contacts], abs=WITHIN_MM)
