@@ -47,7 +47,8 @@ function peer() {
   const board = new Board(fs.readFileSync(image), [new (kind === 'mlx90393' ? CommandedMlx90393 : CommandedTmag5170)(wandering(0)), ...Array(15).fill(null)]);
   let waited = 0, since = 0;
   board.mcu.gpio[LAMP].addListener((state) => { if (state === 1) since = board.instructions; else waited += board.instructions - since; });
-  board.run(300 * MS);
+  for (let i = 0; i < 300 && !board.restarts; i++) board.run(MS);
+  if (board.restarts) throw new Error('the peer gave up');
   const samples = () => board.mcu.peripherals[0x40058].scratchData[1], before = samples();
   board.measure();
   waited = since = 0;

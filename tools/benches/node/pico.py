@@ -10,6 +10,7 @@ import subprocess
 from pathlib import Path
 
 from .. import store
+from . import pico_peers
 
 ROOT = Path(__file__).resolve().parents[3]
 IMAGE = ROOT / "firmware/images/pico/pico.bin"
@@ -25,6 +26,8 @@ BAD = ("lost", "altered", "doubled", "errors", "wrong")
 def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=int, default=FRAMES, help="of 8 lanes at 2 kHz (%(default)s)")
     parser.add_argument("--faults", type=int, default=FAULTS, help="(%(default)s)")
+    text = "folder with fetched sources of public drivers, to run beside this firmware: Adafruit_MLX90393.cpp, Zephyr's tmag5170.c"
+    parser.add_argument("--peer", type=Path, metavar="DIR", help=text)
 
 
 def piece(script: str, *words: int) -> dict:
@@ -48,7 +51,7 @@ def added(total: dict, found: dict) -> dict:
     return out
 
 
-def run(build: Path, frames: int = FRAMES, faults: int = FAULTS) -> None:
+def run(build: Path, frames: int = FRAMES, faults: int = FAULTS, peer: Path | None = None) -> None:
     """Goes on until so many are counted; SystemExit names what was not clean. `build` is not needed."""
     cache = store.kept("pico", *INPUTS)
     soak: dict = {}
@@ -64,6 +67,7 @@ def run(build: Path, frames: int = FRAMES, faults: int = FAULTS) -> None:
         campaign = added(campaign, found)
         print(f"{campaign['faults']} faults")
     result = {"image": hashlib.sha256(IMAGE.read_bytes()).hexdigest(), "soak": soak, "faults": campaign}
+    result["peers"] = pico_peers.rows(peer)
     store.write_result("pico", result)
     if bad := {name: part[name] for part in (soak, campaign) for name in BAD if part.get(name)}:
         raise SystemExit(f"not clean: {bad}")

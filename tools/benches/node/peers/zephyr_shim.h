@@ -76,8 +76,7 @@ static inline uint8_t crc4_ti(uint8_t crc, const uint8_t *bytes, size_t n)
     static const uint8_t AFTER[16] = {0, 3, 6, 5, 12, 15, 10, 9, 11, 8, 13, 14, 7, 4, 1, 2};
     for (size_t i = 0; i < n; i++) {
         crc = AFTER[crc ^ bytes[i] >> 4];
-        if (i + 1u < n) /* the last nibble is the sum's place */
-            crc = AFTER[crc ^ (bytes[i] & 0xFu)];
+        crc = AFTER[crc ^ (bytes[i] & 0xFu)];
     }
     return crc;
 }
