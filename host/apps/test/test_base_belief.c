@@ -125,6 +125,22 @@ static void frames_of_an_earlier_request_are_no_answer(void **state)
     assert_int_equal(robot.phase, BASE_RESTING);
 }
 
+/* Of a base that charges a line comes each second: it is told when it has come, and once. */
+static void what_tells_more_than_nothing_is_told_once(void **state)
+{
+    (void)state;
+    static const char text[] = "battery 14200 mV\r\n";
+    for (int i = 1; i <= 4; i++) {
+        if (i % 2 == 0) {
+            assert_int_equal(send(line, text, sizeof text, 0), sizeof text);
+        }
+        const int64_t now_ms = robot.opened_ms + BASE_SILENCE_MS;
+        base_robot_read(&robot, UINT64_MAX, now_ms);
+        base_robot_watch(&robot, now_ms);
+        assert_int_equal(log_lines, i < 2 ? 1 : 2);
+    }
+}
+
 static void a_base_that_is_not_heard_for_half_a_second_stands(void **state)
 {
     (void)state;
@@ -389,18 +405,25 @@ static void a_stop_is_tried_until_it_is_written(void **state)
  * clock
  */
 
-/* Frames each 15 ms, and a hole in them, whatever the bytes show. */
-static void the_clock_says_how_long_a_gap_is(void **state)
+/* Driving, by 20 frames in time; when the last came. */
+static int64_t drive_evenly(void)
 {
-    (void)state;
     int64_t now_ms = OPENED_MS;
     say(commander, "drive 0.2 0", now_ms + FRAME_MS);
     for (int i = 0; i < 20; i++) {
         report_frame(200, 3, now_ms += FRAME_MS);
     }
     motion = (struct create_motion){0};
-    const uint64_t missed = robot.missed;
     base_robot_read(&robot, UINT64_MAX, now_ms + 299);
+    return now_ms;
+}
+
+/* Frames each 15 ms, and a hole in them, whatever the bytes show. */
+static void the_clock_says_how_long_a_gap_is(void **state)
+{
+    (void)state;
+    int64_t now_ms = drive_evenly();
+    const uint64_t missed = robot.missed;
     report_frame(200, 3, now_ms += 300);
     assert_int_equal(robot.missed - missed, 19);
     assert_true(fabs(motion.x - 0.06) < 1e-6);
@@ -415,14 +438,7 @@ static void the_clock_says_how_long_a_gap_is(void **state)
 static void frames_that_come_late_are_not_counted_twice(void **state)
 {
     (void)state;
-    int64_t now_ms = OPENED_MS;
-    say(commander, "drive 0.2 0", now_ms + FRAME_MS);
-    for (int i = 0; i < 20; i++) {
-        report_frame(200, 3, now_ms += FRAME_MS);
-    }
-    motion = (struct create_motion){0};
-    base_robot_read(&robot, UINT64_MAX, now_ms + 299);
-    now_ms += 300;
+    int64_t now_ms = drive_evenly() + 300;
     for (int i = 0; i < 20; i++) {
         report_frame(200, 2, now_ms);
     }
@@ -459,6 +475,7 @@ int main(void)
         HEARD(what_it_said_on_another_connection_does_not_count),
         HEARD(a_base_that_was_not_heard_for_a_while_may_have_been_carried),
         HEARD(frames_of_an_earlier_request_are_no_answer),
+        UNHEARD(what_tells_more_than_nothing_is_told_once),
         HEARD(a_base_that_is_not_heard_for_half_a_second_stands),
         HEARD(what_has_waited_to_be_read_is_old),
         HEARD(a_mode_that_is_said_again_and_again_is_entered),

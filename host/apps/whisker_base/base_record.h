@@ -102,12 +102,13 @@ struct base_robot {
     bool silent;            /* it was heard, and then no more: until a frame comes the wheels stay stopped */
     unsigned held;          /* bits of enum base_hold: while one is set the wheels stay stopped */
     int64_t drive_ms, opened_ms;
-    int64_t frame_ms;    /* when the newest frame was said, at the latest: what has waited to be read is older */
-    int64_t heard_ms;    /* when it was said, at the earliest */
-    int64_t emptied_ms;  /* when nothing was left to read */
-    double schedule_ms;  /* when it was due, by those that came soonest */
-    uint32_t pending;    /* frames that count as missed by the clock alone: they may come late */
-    int64_t reported_ms; /* when a silence was logged that still lasts; 0: none does */
+    int64_t frame_ms;      /* when the newest frame was said, at the latest: what has waited to be read is older */
+    int64_t heard_ms;      /* when it was said, at the earliest */
+    int64_t emptied_ms;    /* when nothing was left to read */
+    double schedule_ms;    /* when it was due, by those that came soonest */
+    uint32_t pending;      /* frames that count as missed by the clock alone: they may come late */
+    int64_t reported_ms;   /* when a silence was logged that still lasts; 0: none does */
+    bool reported_nothing; /* then: that nothing came */
     struct create_ordered ordered; /* since the newest frame, up to ordered_ms */
     int64_t ordered_ms;
     uint32_t frames_since_drive;

@@ -361,12 +361,14 @@ static const char *whisker_base_robot_cause(const struct base_unframed *unframed
                                                 : "what comes is no frame; check --baud, --model and the cable";
 }
 
-/* A line that stays silent is reported once, and then every hour. */
+/* A line that stays silent is reported once, again when what comes tells more than nothing did, and then every hour. */
 static void whisker_base_robot_log_silence(struct base_robot *robot, const struct base_unframed *unframed,
                                            int64_t now_ms)
 {
-    if (robot->reported_ms == 0 || now_ms - robot->reported_ms >= BASE_TELL_MS) {
+    const bool tells_more = robot->reported_nothing && unframed->all > 0;
+    if (robot->reported_ms == 0 || tells_more || now_ms - robot->reported_ms >= BASE_TELL_MS) {
         robot->reported_ms = now_ms;
+        robot->reported_nothing = unframed->all == 0;
         base_log(&robot->log.silence, LOG_WARN,
                  "%s: no frame for %d ms: %s; ordered to stop, but the wheels may turn; asked "
                  "again every %d ms",

@@ -144,26 +144,9 @@ static struct reading odometry_request(const struct create_odometry *odometry, d
     return (struct reading){now * scale, odometry->settings.requested_sigma, UNIFORM_SIGMA * fabs(now - was), 0};
 }
 
-static struct reading odometry_read_distance(const struct create_odometry *odometry, const struct create_frame *frame,
-                                             double asked)
+static struct reading odometry_report(const struct create_odometry *odometry, int32_t units, double unit, double scale)
 {
-    const struct create_odometry_settings *settings = &odometry->settings;
-    if (odometry->distance == CREATE_REPORTED) {
-        return (struct reading){frame->value[CREATE_OI_DISTANCE] * DISTANCE_UNIT_M * settings->distance_scale,
-                                settings->relative_sigma, 0, DISTANCE_UNIT_M};
-    }
-    return odometry_request(odometry, odometry->asked_m, asked, settings->distance_scale);
-}
-
-static struct reading odometry_read_angle(const struct create_odometry *odometry, const struct create_frame *frame,
-                                          double asked)
-{
-    const struct create_odometry_settings *settings = &odometry->settings;
-    if (odometry->angle == CREATE_REPORTED) {
-        return (struct reading){frame->value[CREATE_OI_ANGLE] * ANGLE_UNIT_RAD * settings->angle_scale,
-                                settings->relative_sigma, 0, ANGLE_UNIT_RAD};
-    }
-    return odometry_request(odometry, odometry->asked_rad, asked, settings->angle_scale);
+    return (struct reading){units * unit * scale, odometry->settings.relative_sigma, 0, unit};
 }
 
 static struct create_step odometry_step_of(const struct create_odometry *odometry, struct reading distance,
@@ -280,8 +263,15 @@ static struct create_step odometry_step_by_values(struct create_odometry *odomet
     remainder_watch(odometry, frame, asked);
     odometry->distance = odometry_choose(odometry, asked.distance, reported.distance);
     odometry->angle = odometry_choose(odometry, asked.angle, reported.angle);
-    struct create_step step =
-        odometry_step_of(odometry, odometry_read_distance(odometry, frame, d), odometry_read_angle(odometry, frame, a));
+    const double far = odometry->settings.distance_scale, wide = odometry->settings.angle_scale;
+    const struct reading distance =
+        odometry->distance == CREATE_REPORTED
+            ? odometry_report(odometry, frame->value[CREATE_OI_DISTANCE], DISTANCE_UNIT_M, far)
+            : odometry_request(odometry, odometry->asked_m, d, far);
+    const struct reading angle = odometry->angle == CREATE_REPORTED
+                                     ? odometry_report(odometry, frame->value[CREATE_OI_ANGLE], ANGLE_UNIT_RAD, wide)
+                                     : odometry_request(odometry, odometry->asked_rad, a, wide);
+    struct create_step step = odometry_step_of(odometry, distance, angle);
     odometry_bound(odometry, &step, frame, false);
     if (frame->timing == CREATE_LATE) { /* here it is, and what it was thought to be worth is taken back */
         step.distance -= odometry->missed_m;

@@ -113,14 +113,16 @@ static size_t hear_clean(void)
     return robot.count;
 }
 
-static void test_lost_bytes(void **state)
+static void test_lost_and_extra_bytes(void **state)
 {
     (void)state;
-    size_t all = hear_clean();
-    struct sim_create_options options = sim_create_defaults(CREATE_OI_V2);
-    options.lose = 0.02;
-    stream_under(options);
+    const size_t all = hear_clean();
+    struct sim_create_options losing = sim_create_defaults(CREATE_OI_V2), adding = losing;
+    losing.lose = adding.extra = 0.02;
+    stream_under(losing);
     assert_in_range(robot.count, (size_t)(0.975 * (double)all), (size_t)(0.985 * (double)all));
+    stream_under(adding);
+    assert_in_range(robot.count, (size_t)(1.015 * (double)all), (size_t)(1.025 * (double)all));
 }
 
 static void test_flipped_bits(void **state)
@@ -137,16 +139,6 @@ static void test_flipped_bits(void **state)
         wrong += bits != 0;
     }
     assert_in_range(wrong, (size_t)(0.015 * (double)all), (size_t)(0.025 * (double)all));
-}
-
-static void test_extra_bytes(void **state)
-{
-    (void)state;
-    size_t all = hear_clean();
-    struct sim_create_options options = sim_create_defaults(CREATE_OI_V2);
-    options.extra = 0.02;
-    stream_under(options);
-    assert_in_range(robot.count, (size_t)(1.015 * (double)all), (size_t)(1.025 * (double)all));
 }
 
 static void test_same_seed_same_faults(void **state)
@@ -341,9 +333,8 @@ int main(void)
         cmocka_unit_test(test_groups_may_be_streamed),
         cmocka_unit_test(test_budget),
         cmocka_unit_test(test_pace_of_the_line),
-        cmocka_unit_test(test_lost_bytes),
+        cmocka_unit_test(test_lost_and_extra_bytes),
         cmocka_unit_test(test_flipped_bits),
-        cmocka_unit_test(test_extra_bytes),
         cmocka_unit_test(test_same_seed_same_faults),
         cmocka_unit_test(test_lost_orders),
         cmocka_unit_test(test_silence),

@@ -93,38 +93,35 @@ class Status:
         self._hub.unwatch(self._tap)
 
 
-class Rings:
+class Changing:
+    """A message as JSON, at first and when it changes."""
+
+    def __init__(self, hub: Hub, options: dict):
+        self._hub, self._reported = hub, None
+
+    def take(self) -> str | None:
+        message = self._message()
+        if message == self._reported:
+            return None
+        self._reported = message
+        return json.dumps(message)
+
+    def close(self) -> None:
+        return
+
+
+class Rings(Changing):
     """Names of the rings that can be asked for and whose they are, as JSON, at first and when they change."""
 
-    def __init__(self, hub: Hub, options: dict):
-        self._hub, self._reported = hub, None
-
-    def take(self) -> str | None:
-        message = {"topic": "rings", "rings": self._hub.rings(), "owners": self._hub.owners()}
-        if message == self._reported:
-            return None
-        self._reported = message
-        return json.dumps(message)
-
-    def close(self) -> None:
-        return
+    def _message(self) -> dict:
+        return {"topic": "rings", "rings": self._hub.rings(), "owners": self._hub.owners()}
 
 
-class Controls:
+class Controls(Changing):
     """What is recorded, and whether a page has the robot stand, as JSON, at first and when it changes."""
 
-    def __init__(self, hub: Hub, options: dict):
-        self._hub, self._reported = hub, None
-
-    def take(self) -> str | None:
-        message = {"topic": "controls"} | self._hub.controls()
-        if message == self._reported:
-            return None
-        self._reported = message
-        return json.dumps(message)
-
-    def close(self) -> None:
-        return
+    def _message(self) -> dict:
+        return {"topic": "controls"} | self._hub.controls()
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 The orders are taken down by the base at the time they come. No time is judged but that nothing is sent in the end.
 """
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -45,6 +46,19 @@ def made(tmp_path):
         one.close()
 
 
+@contextlib.contextmanager
+def driven(base: Peer, running: Running):
+    """Somebody drives, whatever happens to the driver; the number of the driver's process."""
+    running.ready().close()
+    driver = running.driver
+    driving = Driving(running)
+    try:
+        base.await_order(DRIVE, len(base.orders))
+        yield driver
+    finally:
+        driving.close()
+
+
 def stops(base: Peer, since: int) -> None:
     """Zero comes behind the first `since` orders, again and again, and then nothing. Where processes are kept waiting for
     the processor they may stop the wheels before that, too, and drive on."""
@@ -81,21 +95,13 @@ def test_a_commander_that_is_silent_and_one_that_goes(made):
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM])
 def test_the_driver_ends_or_hangs_and_another_drives_on(made, how):
     base, running = made()
-    running.ready().close()
-    driving, driver = Driving(running), running.driver
-    try:
-        base.await_order(DRIVE)
+    with driven(base, running) as driver:  # up to here, so that no other driver has anything to stop
         os.kill(driver, how)
-    finally:
-        driving.close()  # so that no other driver has anything to stop
     since = len(base.orders)
     base.await_order(STILL, since)
     wait_for(lambda: is_another(running, driver), "no other driver")
-    driving = Driving(running)
-    try:
-        base.await_order(DRIVE, len(base.orders))
-    finally:
-        driving.close()
+    with driven(base, running):
+        pass
     stops(base, len(base.orders))
 
 
@@ -108,61 +114,41 @@ def is_another(running: Running, driver: int) -> bool:
 
 def test_the_guard_dies(made):
     base, running = made()
-    running.ready().close()
-    driving = Driving(running)
-    try:
-        base.await_order(DRIVE)
+    with driven(base, running):
         running.process.kill()
         running.process.wait()
         stops(base, len(base.orders) - 1)
-    finally:
-        driving.close()
     with pytest.raises(BaseLost):
         Base(str(running.socket))
 
 
 def test_the_guard_hangs_and_goes_on(made):
     base, running = made()
-    running.ready().close()
-    driving = Driving(running)
-    try:
-        base.await_order(DRIVE)
+    with driven(base, running):
         os.kill(running.process.pid, signal.SIGSTOP)
         stops(base, len(base.orders) - 1)
         os.kill(running.process.pid, signal.SIGCONT)
         base.await_order(DRIVE, len(base.orders))
-    finally:
-        driving.close()
 
 
 @pytest.mark.parametrize("dies", [True, False])
 def test_the_supervisor_dies_or_hangs(made, dies):
     base, running = made(heart=True)
-    running.ready().close()
-    driving = Driving(running)
-    try:
-        base.await_order(DRIVE)
+    with driven(base, running):
         since = len(base.orders)
         running.leave() if dies else running.fall_silent()
         stops(base, since)
-    finally:
-        driving.close()
     if dies:
         assert running.process.wait(PATIENCE_S) == 0 and not running.socket.exists()
 
 
 def test_both_killed_leave_it_to_the_base(made):
     base, running = made(timeout_s=0.5)
-    running.ready().close()
-    driving, driver = Driving(running), running.driver
-    try:
-        base.await_order(DRIVE)
+    with driven(base, running) as driver:
         os.kill(running.process.pid, signal.SIGSTOP)  # so that it cannot take the driver's part
         os.kill(driver, signal.SIGKILL)
         os.kill(running.process.pid, signal.SIGKILL)
         base.await_silence(1.0)
-    finally:
-        driving.close()
     x = base.x
     base.await_silence(1.5)
     assert base.x == x  # its own time-out
@@ -181,16 +167,11 @@ def test_sigterm_ends_it_with_standing_wheels(made):
 
 def test_no_odometry_stops_and_some_lets_it_drive_again(made):
     base, running = made()
-    running.ready().close()
-    driving = Driving(running)
-    try:
-        base.await_order(DRIVE)
+    with driven(base, running):
         since, base.speaks = len(base.orders), False
         stops(base, since)
         base.speaks = True
         base.await_order(DRIVE, len(base.orders))
-    finally:
-        driving.close()
 
 
 def test_bumpers_are_told_and_a_cliff_stops(made):
