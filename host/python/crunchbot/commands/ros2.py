@@ -3,6 +3,7 @@
 import argparse
 import time
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING
 
 from .. import scene as scenes
@@ -40,24 +41,24 @@ def run(arguments: argparse.Namespace) -> int:
     view = StandardView(scenes.load(arguments.scene), time.time_ns())
     stop = stop_on_signals()
     with open_link("ros2", arguments) as link:
-        node = open_node(view, arguments)
+        node = open_node(view, arguments, stop)
         node.run(link, stop)
     print(f"{node.sent} messages, {node.poses_set} poses set, {node.poses_refused} refused")
     return 0
 
 
-def _zenoh_node(view: StandardView, arguments: argparse.Namespace) -> "Outlet":
+def _zenoh_node(view: StandardView, arguments: argparse.Namespace, stop: Event) -> "Outlet":
     from ..robot.ros2.rmw_zenoh import ZenohNode
 
     router = arguments.router or ROUTER
     node = ZenohNode(view, arguments.robot, arguments.domain, router)
     print(f"node {node.name} in domain {arguments.domain}, by {router}", flush=True)
-    if not node.has_router():
+    if not node.has_router(stop) and not stop.is_set():
         warn(f"{router}: no router answers yet; start one: ros2 run rmw_zenoh_cpp rmw_zenohd")
     return node
 
 
-def _cyclone_node(view: StandardView, arguments: argparse.Namespace) -> "Outlet":
+def _cyclone_node(view: StandardView, arguments: argparse.Namespace, stop: Event) -> "Outlet":
     reach = reach_of(arguments)
     from ..robot.ros2.rmw_cyclonedds import CycloneNode
 

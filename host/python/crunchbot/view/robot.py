@@ -35,7 +35,7 @@ BACK_S = 2.0  # a clock that goes back so far has begun anew
 EXPECTED = ("pilot", "navigator")  # shown as not heard, until they are
 MAPPER, SAME_NS = "mapper", 1_000_000  # the filter's name in its answers; two stamps of one row
 TRUTHS_MOST = 100  # kept for a mapper's answer of the same time: 10 s
-KINDS = ("exploring", "body whisk", "after a whisk")
+KINDS = ("exploring", "body whisk", "after a whisk", "carried")  # by Row.kind
 PARTS = {TIP: "tip", SHAFT: "shaft"}
 SHAPES = {FACE: "face", CORNER: "corner"}
 

@@ -30,6 +30,7 @@ from viewrobot import (
     touch_map,
 )
 
+from crunchbot.observation import CARRIED
 from crunchbot.robot.network import initial_pose
 from crunchbot.robot.network.link import Link
 from crunchbot.robot.network.messages import (
@@ -158,6 +159,12 @@ def surface_row(seq: int, **cells: float) -> Observation:
     return Observation(
         Header.at(seq * ROW_NS), seq, 2, np.zeros(3), np.zeros(3), names, kinds, np.array([*cells.values()])
     )
+
+
+def test_a_robot_that_was_carried_is_shown():
+    model = RobotModel(SCENE)
+    model.take("observation", replace(surface_row(1), kind=CARRIED))
+    assert model.row["kind"] == "carried"
 
 
 def test_a_surface_is_placed_by_the_estimate_of_its_own_row():

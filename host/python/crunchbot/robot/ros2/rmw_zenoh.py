@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
+from threading import Event
 
 import xxhash
 import zenoh
@@ -100,11 +101,12 @@ class ZenohNode(Outlet):
         token = self._graph.token(len(self._topics) + 1, SUBSCRIPTION, POSE_TOPIC, POSE_SCHEMA)
         self._kept.append(self._session.liveliness().declare_token(token))
 
-    def has_router(self) -> bool:
-        """Whether one has answered; waits for it for a while."""
+    def has_router(self, stop: Event) -> bool:
+        """Whether one has answered; waits for it for a while, or until it is to stop."""
         end = time.monotonic() + ROUTER_S
         while not (routers := list(self._session.info.routers_zid())) and time.monotonic() < end:
-            time.sleep(0.05)
+            if stop.wait(0.05):
+                break
         return bool(routers)
 
     def open(self, topic: str, schema: str) -> None:

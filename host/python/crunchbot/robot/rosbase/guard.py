@@ -118,11 +118,11 @@ class Guard:
         except subprocess.TimeoutExpired:
             self._process.kill()
             code = self._process.wait()
-        end_s = time.monotonic() + (REPEAT_S if code else 0.0)
+        if code == 0 or not self._spoke:  # before its first word it has ordered nothing
+            return 0
+        end_s = time.monotonic() + REPEAT_S
         while time.monotonic() < end_s:
             self._orders.send(0.0, 0.0)
             time.sleep(ALIVE_S)
-        if code == 0 or not self._spoke:  # before its first word it has ordered nothing
-            return 0
         self._tell(f"the driver ended with {code}; zero was ordered for {REPEAT_S:.0f} s in its place")
         return 1
