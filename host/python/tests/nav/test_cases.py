@@ -405,6 +405,7 @@ OF_MAPS = {
     "raw": (both(image(grey(100, 0)), RAW), RIGHT),
     "raw_ends": (both(image(grey(100, 0)), RAW, yaml(*ENDS)), RIGHT),
     "raw_unknown": (both(image(np.where(np.indices(WALL.shape)[1] > 55, 255, grey(100, 0)).astype(np.uint8)), RAW), OTHER_WORLD),
+    "half_unknown": (both(image(np.where(np.indices(WALL.shape)[1] > 29, 255, grey(100, 0)).astype(np.uint8)), RAW), "% of the rows are on ground that nobody mapped, .*; map it"),
     "raw100": (both(image(grey(255, 0)), RAW), "no cell is solid: 86% free, 0% solid, 14% unknown by mode raw"),
     "res0": (yaml("0.05", "0.0"), "! 'resolution' must be a number from 0.0001 .*not 0.0; "),
     "resstr": (yaml("0.05", '"0.05"'), "! 'resolution' must be a number .*not '0.05'; "),
