@@ -125,7 +125,7 @@ static void frames_of_an_earlier_request_are_no_answer(void **state)
     assert_int_equal(robot.phase, BASE_RESTING);
 }
 
-/* Of a base that charges a line comes each second: it is told when it has come, and once. */
+/* Of a base that charges a line comes each second: it is reported when it has come, and once. */
 static void what_tells_more_than_nothing_is_told_once(void **state)
 {
     (void)state;

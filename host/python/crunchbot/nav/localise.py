@@ -37,7 +37,7 @@ __all__ = [
 
 ESTIMATE_HEADER = "t_s,x_m,y_m,theta_rad,confidence"
 JUDGED_MOST = 200_000  # components of beliefs that are judged, for each row of the run
-UNMAPPED_MOST = 0.05  # as of rows that cannot be used: more is told
+UNMAPPED_MOST = 0.05  # as of rows that cannot be used: more is reported
 REGION_ROWS = 200  # coverage is judged on at most so many rows, evenly spread: a region costs more than a step
 
 
