@@ -56,6 +56,12 @@ def headlines() -> str:
     return table(["figure", "value", "unit", "n, how sure", "compared with", "made by", "commit", "machine"], rows)
 
 
+def archive() -> str:
+    """Of docs/results/archive.md."""
+    studies = tomllib.loads((ROOT / "bench/archive.toml").read_text())["study"]
+    return table(list(studies[0]), [list(study.values()) for study in studies])
+
+
 def charts() -> str:
     rows = [
         [f"[{name}](charts/{name}.svg)", f"`.venv/bin/python {command}`"]

@@ -1,7 +1,7 @@
 """Tables of docs/results/node_faults.md."""
 
 from ..store import read_result
-from ..tables import lined, named, table
+from ..tables import lined, table
 
 LOST = ((0, 0), (1, 1), (2, 2), (3, 10), (11, 50), (51, 300))  # groups of ticks
 
@@ -41,34 +41,6 @@ def storm() -> str:
         "overwritten": "words of the link that its arming displaced amid a transfer at a wrong time, each in a record reported as bad",
     }
     return table(["what", "count"], [[text, f"{found[name]:,}".replace(",", " ")] for name, text in what.items()])
-
-
-def skew() -> str:
-    return lined(
-        named(read_result("node")["skew"], "clocks"),
-        {
-            "clocks": "{clocks}",
-            "spread of the sample instants by the nodes, us": "{latch_spread_us_max:.1f}",
-            "with the conversion of the sensor, us": "{true_instant_spread_us_max:.1f}",
-            "oldest angle at the sample, us": "{age_us_max:.1f}",
-            "mean": "{age_us_mean:.1f}",
-        },
-    )
-
-
-def armed() -> str:
-    found = read_result("node")
-    load = found["load"]
-    rows = [
-        [f"SYNC to the armed record, {clocks}: latest, us", f"{us:.0f}"] for clocks, us in found["armed_us_max"].items()
-    ]
-    rows.append(
-        [
-            "interrupts of a tick, each on its longest path, cycles",
-            f"{load['cycles_per_tick']:.0f} of {load['of_cycles_per_tick']}",
-        ]
-    )
-    return table(["what", "value"], rows)
 
 
 def image() -> str:

@@ -1,6 +1,7 @@
 """`whisker export`: a recording as CSV, Parquet or NWB (crunchbot.recording.exporting)."""
 
 import argparse
+import json
 from collections import Counter
 from pathlib import Path
 
@@ -20,6 +21,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_output(parser, "out", type=Path, metavar="OUT", help=text)
     text = "such as 0,2,5-7 (default: those in use)"
     parser.add_argument("--lanes", type=lane_list(LANES), metavar="LIST", help=text)
+    parser.add_argument("--json", action="store_true", help="print what was written as one line of JSON")
     parser.set_defaults(run=run)
 
 
@@ -27,19 +29,24 @@ def run(arguments: argparse.Namespace) -> int:
     with read(arguments.file) as recording:
         table = Table(recording, arguments.lanes)
         export(table, arguments.out)
-        if lost := lost_in(recording):
-            warn(f"{arguments.file}: {lost}")
-        for line in recording.damage:
-            warn(line)
+        missing, overrun = lost_in(recording)
+        damage = list(recording.damage)
+    if arguments.json:
+        said = {"out": str(arguments.out), "frames": table.frames, "lanes": list(table.names)}
+        print(json.dumps(said | {"missing": missing, "overrun": overrun, "damage": damage}))
+        return 0
+    if missing + overrun:
+        why = f"{missing} never came, {overrun} were not read in time"
+        warn(f"{arguments.file}: {missing + overrun} frames are lost, where tick jumps: {why}")
+    for line in damage:
+        warn(line)
     print(f"{arguments.out}: {table.frames} frames, lanes {', '.join(table.names)}")
     return 0
 
 
-def lost_in(recording: Recording) -> str:
-    """What was lost before it was written, by its events; empty: nothing."""
+def lost_in(recording: Recording) -> tuple[int, int]:
+    """Frames that never came, and those that were not read in time, by the recording's events."""
     lost = Counter()
     for event in recording.events():
         lost[event.kind] += event.frames
-    missing, overrun = lost["missing"], lost["overrun"]
-    why = f"{missing} never came, {overrun} were not read in time"
-    return f"{missing + overrun} frames are lost, where tick jumps: {why}" if missing + overrun else ""
+    return lost["missing"], lost["overrun"]

@@ -1,6 +1,7 @@
 """What other tools read of an exported recording is what was recorded: every row, angles in degrees, bad samples none."""
 
 import csv
+import json
 import math
 
 import numpy as np
@@ -49,6 +50,13 @@ def exported(capsys, recording, path, *more):
         f"whisker: warning: {recording}: {lost}\n",
     ) and out == f"{path}: {ROWS} frames, lanes {', '.join(NAMES)}\n"
     return path
+
+
+def test_a_machine_gets_an_object(capsys, tmp_path, recording):
+    code, out, err = run(capsys, "export", recording, tmp_path / "a.csv", "--json")
+    assert (code, err) == (0, "")
+    said = {"out": str(tmp_path / "a.csv"), "frames": ROWS, "lanes": NAMES}
+    assert json.loads(out) == said | {"missing": 10, "overrun": 0, "damage": []}
 
 
 def test_what_the_recording_lost_is_said(capsys, tmp_path, frames):
