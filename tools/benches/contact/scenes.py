@@ -5,6 +5,7 @@ A scene gives, for every tick of 0.5 ms from the first touch on: the base's moti
 plug in two axes, and the truth in the whisker's frame.
 """
 
+import hashlib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,7 +20,8 @@ TICK_S = 5e-4
 CONE, TIP = 0.181739, 0.140
 CREEP, CREEP_S, KAPPA = 0.075, 0.5, 1.0
 NOISE_RAD, GAIN_SD, MOTION_SD = 2e-4, 0.01, 0.01
-FRICTION, FRICTION_SD = 0.3, 0.05
+# Resin on painted wood or plastic about 0.2 to 0.4; whisker on steel 0.48 (Huet and Hartmann 2016, IEEE Trans. Haptics).
+FRICTION = (0.1, 0.5)
 RADIUS_SD_M, SPEED_SD = 0.03, 0.15  # of a place anywhere from 36 to 140 mm; of each component of an object's velocity
 LEAD = 800  # ticks before a corner is touched
 EVERY = 10  # ticks between two solutions of the elastica
@@ -36,7 +38,6 @@ class Scene(NamedTuple):
     point: np.ndarray  # (n, 2)
     normal: np.ndarray  # (n,) of the surface; nan: a corner
     velocity: np.ndarray  # (n, 2) of the object
-    centre: np.ndarray  # (n, 2) of a cylinder; nan: none
     grip: np.ndarray  # (n,) share of the friction cone that the force uses; nan: not known
 
 
@@ -49,10 +50,10 @@ class Draw(NamedTuple):
     rng: np.random.Generator
 
     @classmethod
-    def of(cls, seed: int) -> "Draw":
-        rng = np.random.default_rng(seed)
-        friction = float(np.clip(FRICTION + FRICTION_SD * rng.normal(), 0.05, 0.5))
-        return cls(GAIN_SD * rng.normal(), friction, MOTION_SD * rng.normal(), rng)
+    def of(cls, words: str) -> "Draw":
+        """By the hash of what the contact is called."""
+        rng = np.random.default_rng(list(hashlib.sha256(words.encode()).digest()))
+        return cls(GAIN_SD * rng.normal(), rng.uniform(*FRICTION), MOTION_SD * rng.normal(), rng)
 
     def measured(self, tilt: np.ndarray) -> np.ndarray:
         """(n, 2) from the tilt (n,) of the bending's plane."""
@@ -85,14 +86,9 @@ class Plan(NamedTuple):
     bases: np.ndarray  # velocity along and across the whisker, rate of turn
     velocity: np.ndarray  # of the object, in the world, whose axes are the whisker's at the first touch
     touched_m: float
-    round_m: float = 0.0  # radius of the object; 0: a corner
-    normal: float = QUARTER  # of its surface there
+    normal: float = QUARTER  # of the surface there
+    thing: dict = {"kind": "peg"}  # what is met (peers/follow.py); sim/mechanics knows pegs only
     lies: bool = False  # the contact goes on when the whisker lies along the surface
-
-    @property
-    def centre(self) -> np.ndarray:
-        """Of the object, at the first touch."""
-        return np.array([self.touched_m, 0.0]) - self.round_m * np.array([np.cos(self.normal), np.sin(self.normal)])
 
 
 class Corner(NamedTuple):
@@ -132,9 +128,9 @@ class Corner(NamedTuple):
         tilt, point, velocity = self.felt(draw.friction)
         none = np.full(len(tilt), np.nan)
         reported = self.plan.bases * (1 + draw.motion)
-        return Scene(reported, draw.measured(tilt), point, none, velocity, np.column_stack([none, none]), none)
+        return Scene(reported, draw.measured(tilt), point, none, velocity, none)
 
-    def bound(self, draw: Draw, friction_sd: float) -> np.ndarray:
+    def bound(self, draw: Draw) -> np.ndarray:
         """(n,) Cramer-Rao bound of the point's error, mm: root of the trace of its least covariance after each tick.
 
         Unknown: start of the contact (free), place, gain, friction, error of the reported motion, and of an object that
@@ -162,7 +158,7 @@ class Corner(NamedTuple):
         slopes = np.column_stack([*tilts, middle])  # the last: by ln of the gain
         places = np.stack([*points, np.zeros_like(points[0])], axis=2)
         prior = dict.fromkeys(steps, 0.0) | {"radius": RADIUS_SD_M**-2.0, "motion": MOTION_SD**-2.0}
-        prior |= {"friction": max(friction_sd, 1e-6) ** -2.0} | (
+        prior |= {"friction": 12.0 / (FRICTION[1] - FRICTION[0]) ** 2} | (
             {"vx": SPEED_SD**-2.0, "vy": SPEED_SD**-2.0} if moves else {}
         )
         held = np.diag([*prior.values(), GAIN_SD**-2.0])
@@ -172,13 +168,16 @@ class Corner(NamedTuple):
         return 1e3 * np.sqrt(np.concatenate([np.full(EVERY, np.nan), traces]))
 
 
+def job_of(plan: Plan, draw: Draw) -> dict:
+    """What peers/follow.py is asked for."""
+    against = plan.bases - np.column_stack([plan.velocity, np.zeros(len(plan.bases))])
+    job = {"beam": spec(0.3e-3, KAPPA, 20), "thing": plan.thing, "place": [plan.touched_m, 0.0], "normal": plan.normal}
+    return job | {"friction": round(draw.friction, 6), "bases": against.round(6).tolist()}
+
+
 def chained(plan: Plan, draw: Draw) -> Scene | None:
     """The plan by a chain of 20 links in MuJoCo, whose plug does not creep; None when nothing is felt."""
-    against = plan.bases - np.column_stack([plan.velocity, np.zeros(len(plan.bases))])
-    kind = "face" if plan.round_m > 1.0 else "cylinder" if plan.round_m > 0.0 else "peg"
-    job = {"beam": spec(0.3e-3, KAPPA, 20), "object": kind, "place": [plan.touched_m, 0.0], "radius": plan.round_m}
-    job |= {"normal": plan.normal, "friction": round(draw.friction, 6), "bases": against.round(6).tolist()}
-    reported = chain("grip", job, FOLLOW)
+    reported = chain("grip", job_of(plan, draw), FOLLOW)
     places = reported["places"]
     touched = [i for i, place in enumerate(places) if place is not None and np.hypot(*place[:2]) < TIP + REACH_M]
     if len(touched) < 2:
@@ -188,19 +187,15 @@ def chained(plan: Plan, draw: Draw) -> Scene | None:
     x, y, normal, grip = (np.interp(used, kept, column) for column in np.array([places[i] for i in kept]).T)
     tilt = np.array(reported["tilt"])[used]
     ends = [len(used), *np.flatnonzero((np.abs(tilt) > LARGEST_RAD) | (np.hypot(x, y) < LEAST_M))[:1]]
-    if kind == "face" and not plan.lies:
+    if plan.thing["kind"] == "face" and not plan.lies:
         ends.append(lying(x))
     used, x, y, normal, grip, tilt = (part[: min(ends)] for part in (used, x, y, normal, grip, tilt))
-    still = np.tile([np.nan, np.nan], (len(plan.bases), 1))
-    if kind == "cylinder":
-        still, _ = seen(against, np.tile(plan.centre, (len(against), 1)))
     return Scene(
         plan.bases[used] * (1 + draw.motion),
         draw.measured(tilt),
         np.column_stack([x, y]),
-        np.full(len(used), np.nan) if kind == "peg" else normal,
+        normal if plan.thing["kind"] != "peg" else np.full(len(used), np.nan),
         plan.velocity[used],
-        still[used],
         grip,
     )
 

@@ -3,52 +3,56 @@
 from ..store import read_result
 from ..tables import lined, named
 
+MEASURED = (
+    "normal_median_deg",
+    "normal_rms_deg",
+    "normal_held_90",
+    "taken",
+    "taken_median_deg",
+    "taken_worst_deg",
+    "taken_held_90",
+    "speed_median",
+    "speed_held_90",
+)
+
 
 def kinds(case: str) -> list[dict]:
-    return named(read_result("contact")["kinds"][case], "kind")
+    """What a kind has not is None."""
+    return [dict.fromkeys(MEASURED) | one for one in named(read_result("contact")["kinds"][case], "kind")]
+
+
+PLACE = {
+    "contact": "{kind}",
+    "n": "{contacts}",
+    "place median mm": "{point_median_mm:.2f}",
+    "RMS": "{point_rms_mm:.2f}",
+    "worst": "{point_worst_mm:.1f}",
+    "held 90 %": "{point_held_90:100*.0f}",
+    "refused %": "{refused:100*.0f}",
+}
 
 
 def places(case: str) -> str:
-    return lined(
-        kinds(case),
-        {
-            "contact": "{kind}",
-            "n": "{contacts}",
-            "place RMS mm": "{point_rms_mm:.2f}",
-            "median": "{point_median_mm:.2f}",
-            "bound RMS": "{bound_rms_mm:.2f}",
-            "bound median": "{bound_median_mm:.2f}",
-            "held 90 %": "{point_held_90:100*.0f} %",
-            "motion right": "{motion_right:100*.0f} %",
-            "refused": "{refused:100*.0f} %",
-            "us a sample": "{cost_us:.2f}",
-        },
-    )
+    speeds = {"speed median %": "{speed_median:100*.0f}", "speed held 90 %": "{speed_held_90:100*.0f}"}
+    more = {
+        "bound RMS": "{bound_rms_mm:.2f}",
+        "motion right %": "{motion_right:100*.0f}",
+        "us a sample": "{cost_us:.2f}",
+    }
+    return lined(kinds(case), PLACE | more | speeds)
 
 
 def shapes(case: str) -> str:
     return lined(
-        [one for one in kinds(case) if "normal_rms_deg" in one],
-        {
-            "surface": "{kind}",
-            "normal RMS degrees": "{normal_rms_deg:.2f}",
-            "held 90 %": "{normal_held_90:100*.0f} %",
-            "off the surface RMS mm": "{contour_rms_mm:.2f}",
-            "probability of a surface": lambda one: f"{100 * (1 - one['corner']):.0f} %",
-            "normals taken": "{taken:100*.0f} %",
-            "their RMS degrees": "{taken_rms_deg:.2f}",
-            "within 15": "{taken_within_15:100*.0f} %",
-        },
-    )
-
-
-def speeds(case: str) -> str:
-    return lined(
-        [one for one in kinds(case) if "speed_median" in one],
-        {
-            "object that moves": "{kind}",
-            "median error of its speed": "{speed_median:100*.0f} %",
-            "within 10 %": "{speed_within_10:100*.0f} %",
-            "held 90 %": "{speed_held_90:100*.0f} %",
+        kinds(case),
+        PLACE
+        | {
+            "normal median deg": "{normal_median_deg:.1f}",
+            "RMS deg": "{normal_rms_deg:.1f}",
+            "normal held 90 %": "{normal_held_90:100*.0f}",
+            "taken %": "{taken:100*.0f}",
+            "their median": "{taken_median_deg:.1f}",
+            "their worst": "{taken_worst_deg:.0f}",
+            "of these held": "{taken_held_90:100*.0f}",
         },
     )

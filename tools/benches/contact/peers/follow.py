@@ -1,12 +1,13 @@
 """A contact of a chain of 20 links in MuJoCo, given sample by sample. Run by ../scenes.py.
 
-    follow.py grip '{"beam": {...}, "object": "peg", "place": [x, y], "radius": 0, "normal": 0, "friction": 0.3,
+    follow.py grip '{"beam": {...}, "thing": {"kind": "peg"}, "place": [x, y], "normal": 0, "friction": 0.3,
     "bases": [[...]]}'
 
 The mount is driven along the bases (velocity along and across the unbent whisker, rate of turn; one row a tick). The
-object stands still: only the motion between the two matters. One line of JSON: tilt of the plug's hinge, place of the
-contact on the axis, the direction of its normal in the mount's frame and the share of the friction cone that the force
-uses, each tick; null where nothing touches.
+object stands still: only the motion between the two matters. Objects: a peg; a face with how far it goes on from the
+touch towards the mount and away from it; an ellipse of two semi-axes; a wedge of an angle, the direction of its edge
+being `lean`. One line of JSON: tilt of the plug's hinge, place of the contact on the axis, the direction of its normal
+in the mount's frame and the share of the friction cone that the force uses, each tick; null where nothing touches.
 """
 
 import json
@@ -24,21 +25,58 @@ DAMPING_S = 1e-3  # damping over stiffness of every hinge: a damping ratio of 0.
 LEAD = 600  # ticks driven as in the first one before the scene begins: what the start excites has decayed
 
 
-def thing(spec: dict) -> str:
-    """The object, its surface a link's radius from the place that the axis touches."""
-    x, y = spec["place"]
-    contact = 'contype="2" conaffinity="1"'
+CONTACT = 'name="thing" contype="2" conaffinity="1"'
+DEPTH = 0.05  # of a face's and a wedge's body
+HEIGHT = 0.02  # across the plane, half
+
+
+def face_xml(spec: dict, x: float, y: float) -> str:
+    """`x`, `y`: where the surface is touched."""
+    inward, outward = spec["thing"]["ends"]
     c, s = np.cos(spec["normal"]), np.sin(spec["normal"])
-    if spec["object"] == "face":
-        depth = 0.05
-        x, y = x - (depth + LINK_RADIUS) * c, y - (depth + LINK_RADIUS) * s
-        return (
-            f'<geom name="thing" type="box" {contact} pos="{x} {y} 0" size="{depth} 0.5 0.02" '
-            f'euler="0 0 {np.degrees(spec["normal"])}"/>'
-        )
-    radius = PEG_RADIUS if spec["object"] == "peg" else spec["radius"] - LINK_RADIUS
-    x, y = x - (radius + LINK_RADIUS) * c, y - (radius + LINK_RADIUS) * s
-    return f'<geom name="thing" type="cylinder" {contact} pos="{x} {y} 0" size="{radius} 0.02"/>'
+    along = 0.5 * (outward - inward)  # of the middle from the touch, in the direction (s, -c), away from the mount
+    x, y = x - DEPTH * c + along * s, y - DEPTH * s - along * c
+    return (
+        f'<geom {CONTACT} type="box" pos="{x} {y} 0" size="{DEPTH} {0.5 * (inward + outward)} {HEIGHT}" '
+        f'euler="0 0 {np.degrees(spec["normal"])}"/>'
+    )
+
+
+def ellipse_xml(spec: dict, x: float, y: float) -> str:
+    """`lean`: direction of the first axis."""
+    thing = spec["thing"]
+    axes, turn = np.array(thing["axes"]) - LINK_RADIUS, spec["normal"] - thing["lean"]
+    out = np.array([np.cos(turn), np.sin(turn)])
+    from_middle = axes**2 * out / np.hypot(*(axes * out))
+    c, s = np.cos(thing["lean"]), np.sin(thing["lean"])
+    x, y = x - c * from_middle[0] + s * from_middle[1], y - s * from_middle[0] - c * from_middle[1]
+    size = f'type="ellipsoid" size="{axes[0]} {axes[1]} 0.5" euler="0 0 {np.degrees(thing["lean"])}"'
+    return f'<geom {CONTACT} {size} pos="{x} {y} 0"/>'
+
+
+def wedge_xml(spec: dict, x: float, y: float) -> tuple[str, str]:
+    """A prism whose edge points along `lean`."""
+    thing, corners = spec["thing"], [(0.0, 0.0)]
+    for side in (-0.5, 0.5):
+        turn = thing["lean"] + np.pi + side * thing["angle"]
+        corners.append((DEPTH * np.cos(turn), DEPTH * np.sin(turn)))
+    vertices = " ".join(f"{x + a} {y + b} {z}" for a, b in corners for z in (-HEIGHT, HEIGHT))
+    return f'<asset><mesh name="wedge" vertex="{vertices}"/></asset>', f'<geom {CONTACT} type="mesh" mesh="wedge"/>'
+
+
+def peg_xml(spec: dict, x: float, y: float) -> str:
+    c, s = np.cos(spec["normal"]), np.sin(spec["normal"])
+    return f'<geom {CONTACT} type="cylinder" pos="{x - PEG_RADIUS * c} {y - PEG_RADIUS * s} 0" size="{PEG_RADIUS} {HEIGHT}"/>'
+
+
+THINGS = {"peg": peg_xml, "face": face_xml, "ellipse": ellipse_xml, "wedge": wedge_xml}
+
+
+def thing(spec: dict) -> tuple[str, str]:
+    """Assets and shape of the object, its surface a link's radius from the place that the axis touches."""
+    (x, y), c, s = spec["place"], np.cos(spec["normal"]), np.sin(spec["normal"])
+    made = THINGS[spec["thing"]["kind"]](spec, x - LINK_RADIUS * c, y - LINK_RADIUS * s)
+    return made if isinstance(made, tuple) else ("", made)
 
 
 class Contact:
@@ -52,7 +90,9 @@ class Contact:
         )
         beam = Beam(spec["beam"])
         body = whisker_xml(beam, "w", 'pos="0 0 0"', DAMPING_S, ("0 0 1",), 'contype="1" conaffinity="2"', mount)
-        self.model = mujoco.MjModel.from_xml_string(model_xml(body + thing(spec), spec["friction"], STEP_S))
+        assets, shape = thing(spec)
+        text = model_xml(body + shape, spec["friction"], STEP_S).replace("<worldbody>", f"{assets}<worldbody>")
+        self.model = mujoco.MjModel.from_xml_string(text)
         self.data = mujoco.MjData(self.model)
 
     def tick(self, pose: np.ndarray, base: np.ndarray) -> None:
