@@ -18,7 +18,7 @@ from crunchbot import scene as scenes
 from crunchbot.bridge.ring import Reader
 from crunchbot.nav import localise
 from crunchbot.nav.observations import read_observations
-from crunchbot_lab.demo.chain import ChainRun, Link, run_chain
+from crunchbot_lab.demo.chain import ChainRun, SpiLink, run_chain
 from crunchbot_lab.report.run import FILTERS
 from crunchbot_lab.simulation.scenes import make_scene
 
@@ -31,7 +31,7 @@ def models(tmp_path_factory):
 
 
 def fly(folder, models, create: int, seconds: float = SECONDS, build: Path = BUILD) -> ChainRun:
-    made = ChainRun(folder, build, SEED, seconds, 6, Link(6, 30, 5), create, "bytes")
+    made = ChainRun(folder, build, SEED, seconds, 6, SpiLink(6, 30, 5), create, "bytes")
     scene, start = make_scene(SEED)
     scenes.write(made.scene, scene)
     (made.scene / "scene.flat").write_text(scene.flat(start))

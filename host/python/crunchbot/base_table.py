@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .scene_table import Table
+    from . import scene_table
 
 TOUCHES = ("bump_left", "bump_right", "cliff_left", "cliff_right", "wheel_drop")
 COMMAND_TYPES = ("Twist", "TwistStamped")
@@ -51,7 +51,7 @@ class BaseTable:
 CREATE = BaseTable()
 
 
-def read_base(table: "Table") -> BaseTable:
+def read_base(table: "scene_table.Table") -> BaseTable:
     """Of robot.toml, whose other keys stay."""
     if "base" not in table.content:
         return CREATE
@@ -77,7 +77,7 @@ def base_content(base: BaseTable) -> dict:
     return {"base": given | ({"ros2": topics} if topics else {})}
 
 
-def _topics(table: "Table") -> Topics:
+def _topics(table: "scene_table.Table") -> Topics:
     named = {key: _topic(table, key) for key in ("command", "odometry") if key in table.content}
     if "command_type" in table.content:
         named["command_type"] = table.text("command_type", *COMMAND_TYPES)
@@ -91,7 +91,7 @@ def _topics(table: "Table") -> Topics:
     return Topics(**named)
 
 
-def _topic(table: "Table", key: str) -> str:
+def _topic(table: "scene_table.Table", key: str) -> str:
     name = table.text(key)
     if not name.startswith("/") or not name.replace("/", "").replace("_", "").isalnum():
         raise table.fail(key, f"is '{name}', no topic; begin with / and use letters, digits and underscores")

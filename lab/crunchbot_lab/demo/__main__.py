@@ -27,7 +27,7 @@ from ..report import origin, write_report
 from ..report.run import FILTERS
 from ..simulation.scenes import MECHANICS, make_scene
 from . import summary as scores
-from .chain import ChainError, ChainRun, Link, run_chain
+from .chain import ChainError, ChainRun, SpiLink, run_chain
 from .kept_models import learn_or_copy
 from .study import study
 from .training import METHODS, calibrations, learn, radial_scores, write_radial_points
@@ -194,7 +194,7 @@ def run(out: Path, options: argparse.Namespace, level: str = "rtl") -> dict:
 
 def chain_of(out: Path, options: argparse.Namespace, level: str, **more: Any) -> ChainRun:
     """The chain of these options in this folder; `more`: other fields of ChainRun."""
-    link, build = Link(options.sck_divider, options.word_gap, options.sample_point), options.build_dir.resolve()
+    link, build = SpiLink(options.sck_divider, options.word_gap, options.sample_point), options.build_dir.resolve()
     return ChainRun(out, build, options.seed, options.seconds, options.lanes, link, options.create, level, **more)
 
 

@@ -36,7 +36,7 @@ class ChainError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Link:
+class SpiLink:
     """Settings of the node link, in cycles of 60 MHz."""
 
     sck_divider: int
@@ -53,7 +53,7 @@ class ChainRun:
     seed: int
     seconds: float
     lanes: int  # populated
-    link: Link
+    link: SpiLink
     create: int | None = 1  # the base: iRobot Create 1 or 2; None: wheels that obey at once, without a serial line
     level: str = "rtl"  # of the bridge; or bytes, or mixed: the same frames
     rtl_seconds: float = 5.0  # level mixed: so long from the start every clock cycle of the bridge is simulated

@@ -18,7 +18,7 @@ from crunchbot.robot.blocks import blocks
 from crunchbot.robot.simulation_link import SimLink
 from crunchbot_lab.demo import summary
 from crunchbot_lab.demo.__main__ import fresh_folder, guarded, parse
-from crunchbot_lab.demo.chain import ChainError, ChainRun, Link, _await_end, run_chain
+from crunchbot_lab.demo.chain import ChainError, ChainRun, SpiLink, _await_end, run_chain
 from crunchbot_lab.simulation.bridge import flat_scene
 from crunchbot_lab.simulation.scenes import BLOCKS, PRIOR_OFF_M, PRIOR_OFF_RAD, make_scene
 from whisker_protocol import LIMITS
@@ -175,7 +175,7 @@ def chain_of(tmp_path, bridge):
     program(build, "whiskerd", "exit 0\n")
     for name in ("whisker-log", "whisker-base"):
         program(build, name, "exec sleep 100\n")
-    return ChainRun(out, build, 1, 1.0, 6, Link(6, 30, 5))
+    return ChainRun(out, build, 1, 1.0, 6, SpiLink(6, 30, 5))
 
 
 def test_failing_child_is_one_line_with_its_log(tmp_path):

@@ -15,7 +15,7 @@ from crunchbot.observation import cell
 from crunchbot.pilot.pilot import Pilot
 from crunchbot.robot.models import load_models
 from crunchbot_lab.demo import kept_models
-from crunchbot_lab.demo.chain import ChainRun, Link, run_chain
+from crunchbot_lab.demo.chain import ChainRun, SpiLink, run_chain
 from crunchbot_lab.demo.level1 import explore
 from crunchbot_lab.demo.summary import read_pairs
 from crunchbot_lab.simulation.scenes import make_scene
@@ -29,7 +29,7 @@ def run(tmp_path_factory):
     build = ROOT / os.environ.get("WHISKER_BUILD", "build/release")
     if not (build / "sim" / "robot" / "whisker-bridge-sim").exists():
         pytest.skip(f"{build}: the simulated bridge is not built; run 'make build'")
-    made = ChainRun(tmp_path_factory.mktemp("run"), build, SEED, SECONDS, LANES, Link(6, 30, 5), create=None)
+    made = ChainRun(tmp_path_factory.mktemp("run"), build, SEED, SECONDS, LANES, SpiLink(6, 30, 5), create=None)
     scene, start = make_scene(SEED)
     scenes.write(made.scene, scene)
     (made.scene / "scene.flat").write_text(scene.flat(start))
