@@ -257,6 +257,36 @@ static void a_mode_above_the_one_asked_for_is_not_believed(void **state)
     assert_non_null(strstr(health(now_ms), " mode=unknown "));
 }
 
+static void a_mode_above_the_one_in_force_is_a_lie(void **state)
+{
+    (void)state;
+    say(commander, "drive 0.2 0", OPENED_MS + FRAME_MS);
+    report(CREATE_OI_MODE_FULL, 200, 3, OPENED_MS + 2 * FRAME_MS);
+    assert_int_equal(robot.phase, BASE_RESTING);
+    assert_kept(OPENED_MS + 200);
+    assert_int_equal(robot.mode_losses, 0);
+}
+
+/* It sends what was asked for before: what it has half of may be the longest command. */
+static void a_base_that_does_not_hear_the_request_is_asked_again_behind_zeros(void **state)
+{
+    (void)state;
+    uint8_t frame[CREATE_STREAM_BYTES];
+    const size_t count = make_frame(CREATE_OI_MODE_SAFE, 0, 0, frame);
+    say(commander, "mode full", OPENED_MS + 200);
+    carry_away();
+    robot.before = (struct create_stream){0}; /* of a driver before this one */
+    for (int i = 0; i < 8; i++) {
+        assert_int_equal(send(line, frame, count, 0), count);
+        base_robot_read(&robot, UINT64_MAX, OPENED_MS + 200 + i * FRAME_MS);
+        base_robot_watch(&robot, OPENED_MS + 200 + i * FRAME_MS);
+    }
+    assert_true(was_asked_for(CREATE_OI_OP_DRIVE_DIRECT));
+    assert_true(order_count > CREATE_COMMAND_MOST);
+    base_robot_watch(&robot, OPENED_MS + 200 + 7 * FRAME_MS + 100);
+    assert_true(was_asked_for(CREATE_OI_OP_STREAM));
+}
+
 /* Lets go, and is gone: it rests until somebody takes the command. */
 static void a_base_that_was_let_go_rests_until_somebody_commands(void **state)
 {
@@ -447,18 +477,21 @@ static void frames_that_come_late_are_not_counted_twice(void **state)
     assert_true(fabs(motion.x - 0.042) < 1e-6);
 }
 
-/* An adapter holds what was said for 400 ms: seven frames came of it, so the base has said nothing since. */
+/* An adapter holds what was said for 400 ms: seven frames came of it, in two pieces, so the base has said nothing
+ * since.
+ */
 static void what_the_line_has_held_is_old(void **state)
 {
     (void)state;
-    uint8_t frames[7 * CREATE_STREAM_BYTES];
-    size_t count = 0;
     base_robot_read(&robot, UINT64_MAX, OPENED_MS + 399);
     for (int i = 0; i < 7; i++) {
-        count += make_frame(CREATE_OI_MODE_SAFE, 0, 0, frames + count);
+        uint8_t frame[CREATE_STREAM_BYTES];
+        const size_t count = make_frame(CREATE_OI_MODE_SAFE, 0, 0, frame);
+        assert_int_equal(send(line, frame, count, 0), count);
+        if (i >= 5) {
+            assert_true(base_robot_read(&robot, UINT64_MAX, OPENED_MS + 395 + i));
+        }
     }
-    assert_int_equal(send(line, frames, count, 0), count);
-    assert_true(base_robot_read(&robot, UINT64_MAX, OPENED_MS + 400));
     base_robot_watch(&robot, OPENED_MS + 7 * FRAME_MS + BASE_SILENCE_MS - 1);
     assert_true(base_robot_heard(&robot));
     base_robot_watch(&robot, OPENED_MS + 7 * FRAME_MS + BASE_SILENCE_MS);
@@ -483,6 +516,8 @@ int main(void)
         HEARD(a_base_that_did_not_hear_of_a_lower_mode_does_not_drive),
         HEARD(a_mode_ends_with_who_asked_for_it),
         UNHEARD(a_mode_above_the_one_asked_for_is_not_believed),
+        HEARD(a_mode_above_the_one_in_force_is_a_lie),
+        HEARD(a_base_that_does_not_hear_the_request_is_asked_again_behind_zeros),
         HEARD(a_base_that_was_let_go_rests_until_somebody_commands),
         HEARD(an_order_that_the_base_does_not_repeat_is_written_again),
         HEARD(an_order_after_a_pause_begins_with_zero_bytes),

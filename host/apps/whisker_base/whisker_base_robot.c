@@ -126,7 +126,8 @@ static int64_t whisker_base_robot_heard_ms(const struct base_robot *robot)
  * said nothing since. */
 static void whisker_base_robot_note_heard(struct base_robot *robot, int64_t before_ms, int64_t frames)
 {
-    const int64_t least_ms = before_ms + frames * CREATE_OI_PERIOD_MS;
+    const bool goes_on = robot->frame_ms - before_ms < CREATE_OI_PERIOD_MS / 2;
+    const int64_t least_ms = (goes_on ? robot->heard_ms : before_ms) + frames * CREATE_OI_PERIOD_MS;
     if (frames > 0) {
         robot->heard_ms = robot->frame_ms - least_ms > LATE_MS ? least_ms : robot->frame_ms;
     }
@@ -254,6 +255,9 @@ bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
             base_orders_lose(robot, "the line is gone");
             return false;
         }
+        if (robot->unframed.all == 0) {
+            robot->unframed.since_ms = now_ms;
+        }
         for (int i = 0; i < got; i++) {
             whisker_base_robot_look_at(robot, bytes[i]);
             const bool asked = create_stream_push(&robot->stream, bytes[i], &robot->frame);
@@ -340,11 +344,11 @@ void base_robot_change_commander(struct base_robot *robot, bool taken, int64_t n
     }
 }
 
-/* What comes has neither frames nor text in it. */
-static bool whisker_base_robot_astray(const struct base_unframed *unframed)
+/* What comes, for longer than from frame to frame, has neither frames nor text in it. */
+static bool whisker_base_robot_astray(const struct base_unframed *unframed, int64_t now_ms)
 {
-    return unframed->all > 0 && unframed->own == 0 && unframed->other == 0 && 2 * unframed->text <= unframed->all &&
-           2 * unframed->boot <= unframed->all;
+    return unframed->all > 0 && now_ms - unframed->since_ms >= LATE_MS && unframed->own == 0 && unframed->other == 0 &&
+           2 * unframed->text <= unframed->all && 2 * unframed->boot <= unframed->all;
 }
 
 /* Why nothing is heard, by what has come since. */
@@ -423,8 +427,11 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
         whisker_base_robot_restart_stream(robot, now_ms);
     }
     if (robot->silent && !robot->recalled && now_ms - robot->opened_ms >= ANSWER_MS &&
-        whisker_base_robot_astray(&robot->unframed)) {
+        whisker_base_robot_astray(&robot->unframed, now_ms)) {
         base_recall(robot, now_ms);
+    }
+    if (!robot->answered && !robot->repeated && robot->unframed.own > OWN_FRAMES) {
+        base_repeat(robot, now_ms);
     }
     const int64_t silence_ms = whisker_base_robot_heard_ms(robot) + BASE_SILENCE_MS - now_ms;
     const int64_t commander_ms =

@@ -78,6 +78,9 @@ void base_request_soon(struct base_robot *robot, int64_t now_ms);
 void base_recall(struct base_robot *robot, int64_t now_ms);
 void base_recall_end(struct base_robot *robot);
 
+/* Ends whatever a base that goes on as before takes for a command, and asks it again. */
+void base_repeat(struct base_robot *robot, int64_t now_ms);
+
 /* Requests what is due. Returns ms until it is; `idle_ms`: nothing is. */
 int64_t base_request_due(struct base_robot *robot, int64_t now_ms, int64_t idle_ms);
 

@@ -72,6 +72,7 @@ static const char *whisker_base_state_mode_reason(const struct base_robot *robot
  * CREATE_OI_BAUD_WAIT_MS before it goes by it. */
 #define ORDER_LACKS 4
 #define RECALL_MS 500
+#define LIKELY 3 /* of three recalls two are at the first speeds, which one bit makes of an order to the wheels */
 static const uint8_t packets[] = {
     CREATE_OI_BUMPS_DROPS,
     CREATE_OI_CLIFF_LEFT,
@@ -128,7 +129,8 @@ void base_recall(struct base_robot *robot, int64_t now_ms)
     static const uint32_t bauds[] = {CREATE_OI_BAUDS(BAUD)};
 #undef BAUD
     uint8_t bytes[CREATE_COMMAND_BYTES];
-    const uint32_t baud = bauds[robot->recalls++ % (sizeof bauds / sizeof bauds[0])];
+    const uint32_t number = robot->recalls++, rest = number / LIKELY % (sizeof bauds / sizeof bauds[0]);
+    const uint32_t baud = bauds[number % LIKELY + 1 < LIKELY ? number % LIKELY : rest];
     if (baud == robot->options->baud || !create_port_set_baud(robot->port, baud)) {
         return;
     }
@@ -156,6 +158,7 @@ void base_request(struct base_robot *robot, int64_t now_ms)
     const size_t count = whisker_base_state_order_packets(robot, ids);
     whisker_base_state_expect(robot, ids, count);
     robot->opened_ms = now_ms;
+    robot->repeated = false;
     robot->phase = BASE_RESTING;
     robot->mode_offset = 0;
     robot->firm = robot->may_turn = true;
@@ -163,6 +166,14 @@ void base_request(struct base_robot *robot, int64_t now_ms)
     base_orders_wheels(robot, (struct create_speeds){0}, now_ms);
     base_orders_write(robot, bytes, create_put_opcode(bytes, CREATE_OI_OP_START));
     base_orders_write(robot, bytes, create_put_stream(bytes, ids, count));
+}
+
+void base_repeat(struct base_robot *robot, int64_t now_ms)
+{
+    base_orders_again(robot, now_ms);
+    robot->repeated = true;
+    robot->opened_ms = now_ms; /* the line is free before the next request */
+    base_request_soon(robot, now_ms);
 }
 
 void base_request_soon(struct base_robot *robot, int64_t now_ms)
@@ -286,6 +297,8 @@ static void whisker_base_state_watch_mode(struct base_robot *robot, int64_t now_
         whisker_base_state_begin_phase(robot, BASE_ENTERED, now_ms);
     } else if (robot->phase == BASE_ENTERING) {
         whisker_base_state_enter(robot, now_ms);
+    } else if (robot->phase == BASE_ENTERED && base_robot_mode_reported(robot) > (int32_t)robot->wanted) {
+        whisker_base_state_begin_phase(robot, BASE_RESTING, now_ms); /* of itself it goes to lower ones only: a lie */
     } else if (robot->phase == BASE_ENTERED && !in_force) {
         whisker_base_state_leave(robot, now_ms);
     }

@@ -138,6 +138,7 @@ static unsigned recent_count;
 static double true_x, true_y, true_theta, scale_distance, scale_angle, drift;
 static struct sim_create_motion counted;
 static struct create_motion seen_motion;
+static uint64_t lied_frames;                 /* up to this frame sent */
 static uint64_t spoilt_orders;               /* up to this byte sent to the base */
 static bool measurable, disturbed, reported; /* since the odometry was measured last; reported: that it was carried */
 static int64_t turned_ms, leg_from_ms;
@@ -532,6 +533,7 @@ static void add_place(enum sim_create_spoil spoil, const struct fault *fault, ui
     }
     sim_create_add_fault(create, &place);
     const uint64_t past = place.first + place.count;
+    lied_frames = spoil == SIM_CREATE_LIE && past > lied_frames ? past : lied_frames;
     if ((spoil == SIM_CREATE_LOSE_ORDER || spoil == SIM_CREATE_FLIP_ORDER) && past > spoilt_orders) {
         spoilt_orders = past;
     }
@@ -796,6 +798,7 @@ static void judge_odometry(void)
 /* Measures the odometry of a leg, where its beginning and its end are standing and heard. */
 static void measure(void)
 {
+    reported |= during(BLOCK) && !strcmp(health_of("blocked"), "unknown");
     turned_ms = turning() || during(PUSH) ? now_ms : turned_ms;
     for (int i = 0; i < fault_count; i++) {
         disturbed |= now_ms >= faults[i].from_ms && now_ms < faults[i].to_ms;
@@ -860,7 +863,7 @@ static void begin_draw(uint64_t number)
     plugged = measurable = true;
     disturbed = false;
     turned_ms = leg_from_ms = 0;
-    spoilt_orders = 0;
+    spoilt_orders = lied_frames = 0;
     heard_ms = to_robot_ms = to_host_ms = driver_ms = order_ms = ordered_ms = 0;
     mode_wrong_ms = wheels_wrong_ms = lied_ms = stray_ms = 0;
     deafened_ms = now_ms;
@@ -897,6 +900,9 @@ static void run_draw(uint64_t number)
         }
         if (sim_create_where(create).received < spoilt_orders) {
             to_robot_ms = now_ms + 2 * AGREE_MS; /* it waits for the next order */
+        }
+        if (sim_create_where(create).frames < lied_frames) {
+            lied_ms = to_host_ms = now_ms + MARGIN_MS;
         }
         counted.stimuli = stimuli();
         for (int i = 0; i < MS_TICKS; i++) {
