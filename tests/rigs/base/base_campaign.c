@@ -144,7 +144,7 @@ static bool measurable, disturbed, reported; /* since the odometry was measured 
 static int64_t turned_ms, leg_from_ms;
 static unsigned measured[2], within[2], measured_clean, within_clean;
 
-static int64_t mode_wrong_ms, wheels_wrong_ms, lied_ms, stray_ms, deafened_ms;
+static int64_t mode_wrong_ms, in_mode_ms[4], wheels_wrong_ms, lied_ms, stray_ms, deafened_ms;
 static char why[300];
 static char logged[4000];
 
@@ -336,13 +336,17 @@ static void judge_stops(void)
     }
 }
 
+/* A mode that the base has left just now may still be the one that is believed. */
 static void judge_mode(void)
 {
     static const char *const names[] = {"off", "passive", "safe", "full"};
     const int mode = (int)sim_create_mode(create);
     const char *named = health_of("mode");
-    if (!strcmp(named, names[mode]) || !strcmp(named, "unknown") || lied_ms + MARGIN_MS > now_ms ||
-        now_ms <= driver_ms + MARGIN_MS) {
+    in_mode_ms[mode] = now_ms;
+    for (size_t i = 0; i < COUNT(names); i++) {
+        mode_wrong_ms = !strcmp(named, names[i]) && in_mode_ms[i] > mode_wrong_ms ? in_mode_ms[i] : mode_wrong_ms;
+    }
+    if (!strcmp(named, "unknown") || lied_ms + MARGIN_MS > now_ms || now_ms <= driver_ms + MARGIN_MS) {
         mode_wrong_ms = now_ms;
     }
     const int64_t most_ms = now_ms - heard_ms < MARGIN_MS && now_ms > to_host_ms + AGREE_MS ? AGREE_MS : BELIEVED_MS;
@@ -722,9 +726,11 @@ static void command(void)
     order_ms = now_ms + 40 + whole(60);
     snprintf(text, sizeof text, "drive %g %g", v, omega);
     if (order(active, text) && (v != 0 || omega != 0)) {
+        double said_v = 0, said_omega = 0; /* as the text has them: a step of the wheels may lie between */
+        sscanf(text, "drive %lf %lf", &said_v, &said_omega);
         ordered_ms = now_ms;
         recent[recent_count % COUNT(recent)] =
-            create_choose_speeds(options.odometry.model, options.odometry.wheel_base_m, v, omega);
+            create_choose_speeds(options.odometry.model, options.odometry.wheel_base_m, said_v, said_omega);
         recent_count++;
     }
 }
@@ -867,6 +873,7 @@ static void begin_draw(uint64_t number)
     heard_ms = to_robot_ms = to_host_ms = driver_ms = order_ms = ordered_ms = 0;
     mode_wrong_ms = wheels_wrong_ms = lied_ms = stray_ms = 0;
     deafened_ms = now_ms;
+    memset(in_mode_ms, 0, sizeof in_mode_ms);
     active = 0;
     changed = reported = false;
     handed_ms = left_ms = 0;
