@@ -32,7 +32,23 @@ bool create_port_knows(uint32_t baud)
     return port_find_speed(baud, &speed);
 }
 
+/* What waits is of the speed before. */
+static bool port_go_at(int port, struct termios line, speed_t speed)
+{
+    cfsetispeed(&line, speed);
+    cfsetospeed(&line, speed);
+    return tcsetattr(port, TCSANOW, &line) == 0 && tcflush(port, TCIOFLUSH) == 0;
+}
+
 bool create_port_set_baud(int port, uint32_t baud)
+{
+    struct termios line;
+    speed_t speed;
+    return port_find_speed(baud, &speed) && tcgetattr(port, &line) == 0 &&
+           (cfgetospeed(&line) == speed || port_go_at(port, line, speed));
+}
+
+static bool port_make_raw(int port, uint32_t baud)
 {
     struct termios line;
     speed_t speed;
@@ -42,9 +58,7 @@ bool create_port_set_baud(int port, uint32_t baud)
     cfmakeraw(&line);
     line.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS | HUPCL);
     line.c_cflag |= CLOCAL | CREAD;
-    cfsetispeed(&line, speed);
-    cfsetospeed(&line, speed);
-    return tcsetattr(port, TCSANOW, &line) == 0 && tcflush(port, TCIOFLUSH) == 0;
+    return port_go_at(port, line, speed);
 }
 
 int create_port_open(const char *path, uint32_t baud)
@@ -55,7 +69,7 @@ int create_port_open(const char *path, uint32_t baud)
     }
     const int port = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (port >= 0 &&
-        (flock(port, LOCK_EX | LOCK_NB) != 0 || !create_port_set_baud(port, baud) || ioctl(port, TIOCEXCL) != 0)) {
+        (flock(port, LOCK_EX | LOCK_NB) != 0 || !port_make_raw(port, baud) || ioctl(port, TIOCEXCL) != 0)) {
         const int error = errno;
         close(port);
         errno = error;

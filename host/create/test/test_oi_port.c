@@ -75,6 +75,11 @@ static void the_baud_is_set(void **state)
     assert_int_equal(tcgetattr(port, &line), 0);
     assert_int_equal(cfgetospeed(&line), B300);
     assert_false(create_port_set_baud(port, 301));
+    assert_int_equal(create_port_write(port, (const uint8_t *)"x", 1), 1);
+    assert_true(create_port_set_baud(port, 300)); /* as it is: what was written is on its way */
+    uint8_t got;
+    read_all(base, &got, 1);
+    assert_int_equal(got, 'x');
     assert_true(create_port_knows(57600));
     assert_false(create_port_knows(57601));
     close(port);

@@ -19,7 +19,8 @@ bool create_port_knows(uint32_t baud);
  * itself, ENOTTY if it is no terminal. */
 int create_port_open(const char *path, uint32_t baud);
 
-/* Has the line go at another of the interface's speeds from now on. False: it cannot. */
+/* Has the line go at another of the interface's speeds from now on; what waits is thrown away, unless it
+ * is the speed already. False: it cannot. */
 bool create_port_set_baud(int port, uint32_t baud);
 
 /* Lets others open the terminal again, and closes it. */
