@@ -403,6 +403,51 @@ static void the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft(void 
     assert_near(exp(f.part[2].log_weight), 0.1587, 1e-3);
 }
 
+/* The tip on a face of 130 degrees, over which the base moves on by 0.7 mm. */
+static struct nav_contact_filter after_a_block(struct nav_contact_part tip)
+{
+    struct nav_contact_filter f = filter();
+    struct nav_contact_bend b;
+    struct nav_contact_part *part = &f.part[0];
+    *part = tip;
+    part->s[SLOPE] = 0.2;
+    part->s[FIRST] = 130 * DEGREE + atan(part->s[FRICTION]);
+    part->p[FIRST][FIRST] = part->p[SLOPE][SLOPE] = 1e-6;
+    nav_contact_beam_end(&beam, part->s[FIRST], part->s[SLOPE], &b);
+    f.parts = 1;
+    f.side = 1.0;
+    const struct nav_contact_step step = {
+        .moved = {0.0005, -0.0005}, .seconds = 0.01, .tilt = b.moment / 3.0, .variance = 1e-6};
+    nav_contact_bank_step(&f, &step);
+    return f;
+}
+
+static void a_face_under_the_tip_may_end_in_proportion_to_the_way(void **state)
+{
+    (void)state;
+    struct nav_contact_filter f =
+        after_a_block((struct nav_contact_part){.tip = true, .grip = 1.0, .s[FRICTION] = 0.3});
+    assert_int_equal(f.parts, 2);
+    assert_true(f.part[0].tip && f.part[1].corner && !f.part[1].tip);
+    assert_near(exp(f.part[1].log_weight), 0.0005 * sqrt(2.0) / 0.2, 1e-4);
+    assert_near(f.part[1].s[FIRST], beam.tip, 5e-3);
+}
+
+static void a_tip_that_chatters_rubs_either_way_while_it_slides_outwards(void **state)
+{
+    (void)state;
+    struct nav_contact_part tip = {.tip = true, .hops = true, .grip = 1.0, .s[FRICTION] = -0.2};
+    struct nav_contact_filter f = after_a_block(tip);
+    assert_true(f.part[0].hops && f.part[0].slips);
+    assert_near(f.part[0].grip, 1.0, 1e-12);
+    assert_near(f.part[0].s[FRICTION], -0.2, 0.02);
+    double least = (0.3 * 0.3 + 0.05 * 0.05) / 3.0 * 0.03; /* the way over 36 mm, twice, of the cone's variance */
+    assert_in_range(1e6 * f.part[0].p[FRICTION][FRICTION], 1e6 * least, 2e6 * least);
+    struct nav_contact_answer a;
+    nav_contact_filter_answer(&f, &a);
+    assert_near(a.friction, 0.3, 1e-6); /* the surface's, of which a mean says nothing */
+}
+
 /* Tilts of a whisker that buckles: they jump to and fro while the base moves on. */
 static void what_no_hypothesis_explains_is_none_of_them(void **state)
 {
@@ -505,6 +550,8 @@ int main(void)
         cmocka_unit_test(a_body_whisk_is_reported_from_a_drive),
         cmocka_unit_test(an_object_that_moves_is_reported_with_its_speed),
         cmocka_unit_test(a_face_under_the_tip_gives_its_normal),
+        cmocka_unit_test(a_face_under_the_tip_may_end_in_proportion_to_the_way),
+        cmocka_unit_test(a_tip_that_chatters_rubs_either_way_while_it_slides_outwards),
         cmocka_unit_test(the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft),
         cmocka_unit_test(what_no_hypothesis_explains_is_none_of_them),
         cmocka_unit_test(an_object_is_followed_over_a_gap),

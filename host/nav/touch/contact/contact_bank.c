@@ -20,6 +20,10 @@ enum { CORNERS = 14, ROUNDS = 8, NORMALS = 5 };
 #define FLAT 0.02              /* rad, cones: what is not known of a contact that has gone over between tip and shaft */
 #define EDGE 1e-3
 #define LEAST_OVER 1e-2 /* probability from which on a part of a hypothesis goes over */
+#define HOPS 0.5        /* share of the contacts under the tip in which it chatters: nothing is known of it */
+#define HOP_WAY 0.2     /* cones of the base's way over which a chattering tip's friction changes: in chains, 30 mm */
+#define FACE_M 0.2      /* mean way over a face to its end: furniture */
+#define CURVING 2.0     /* 1/m per root of a mm: an ellipse of 45 by 20 mm has 10 to 112 1/m within 52 mm */
 #define QUARTER (NAV_PI / 2.0)
 #define LEAST_LOG_WEIGHT -9.0
 #define TINY 1e-300
@@ -60,6 +64,12 @@ static bool bank_slope(const struct nav_contact_filter *f, struct nav_contact_pa
     return false;
 }
 
+/* Variance of the friction of a tip that chatters: it lies anywhere in the cone. */
+static double bank_chatter(const struct nav_contact_filter *f)
+{
+    return (bank_square(f->config.friction) + bank_square(f->config.friction_sd)) / 3.0;
+}
+
 /* Adds a hypothesis like `kind`. */
 static void bank_add(struct nav_contact_filter *f, const struct nav_contact_step *step,
                      const struct nav_contact_part *kind, double first, double spread, double weight)
@@ -71,23 +81,28 @@ static void bank_add(struct nav_contact_filter *f, const struct nav_contact_step
     struct nav_contact_look look;
     *part = *kind;
     part->log_weight = log(weight);
-    part->grip = 1.0;
+    part->grip = part->hops || part->tip == (step->moved[0] > 0.0) ? 1.0 : -1.0; /* a base that advances draws it in */
     part->s[FIRST] = first;
-    part->s[FRICTION] = c->friction;
+    part->s[FRICTION] = part->hops ? 0.0 : c->friction;
     part->s[ROUND] = part->tip || part->corner ? 0.0 : SHAFT_CURVATURE * c->cone_m;
     if (part->tip)
-        part->s[FIRST] += atan(c->friction);
+        part->s[FIRST] += part->grip * atan(part->s[FRICTION]);
     if (!bank_slope(f, part, step->tilt) || !nav_contact_look(f, part, &look))
         return;
-    double lean = -look.tilt_by[FIRST] / look.tilt_by[SLOPE];
-    part->p[FIRST][FIRST] = bank_square(spread);
-    part->p[FIRST][SLOPE] = part->p[SLOPE][FIRST] = lean * bank_square(spread);
-    part->p[SLOPE][SLOPE] = bank_square(lean * spread) + bank_noise_of(f, step) / bank_square(look.tilt_by[SLOPE]);
+    double rubs = part->hops ? bank_chatter(f) : bank_square(c->friction_sd), slack = 1.0 / look.tilt_by[SLOPE];
+    double leans = part->tip ? part->grip / (1.0 + bank_square(part->s[FRICTION])) : 0.0; /* FIRST by FRICTION ... */
+    double lean = -look.tilt_by[FIRST] * slack, bends = lean * leans - look.tilt_by[2] * slack; /* ... SLOPE by both */
+    part->p[FIRST][FIRST] = bank_square(spread) + bank_square(leans) * rubs;
+    part->p[FIRST][SLOPE] = part->p[SLOPE][FIRST] = lean * bank_square(spread) + leans * bends * rubs;
+    part->p[SLOPE][SLOPE] =
+        bank_square(lean * spread) + bank_square(bends) * rubs + bank_noise_of(f, step) * bank_square(slack);
+    part->p[FIRST][FRICTION] = part->p[FRICTION][FIRST] = leans * rubs;
+    part->p[SLOPE][FRICTION] = part->p[FRICTION][SLOPE] = bends * rubs;
+    part->p[FRICTION][FRICTION] = rubs;
     part->p[ROUND][ROUND] =
         part->corner ? 0.0 : bank_square((part->tip ? TIP_CURVATURE_SD : SHAFT_CURVATURE_SD) * c->cone_m);
     part->p[SPEED_X][SPEED_X] = part->p[SPEED_Y][SPEED_Y] = part->moving ? bank_square(c->speed_sd / c->cone_m) : 0.0;
     part->p[GAIN][GAIN] = bank_square(c->gain_sd);
-    part->p[FRICTION][FRICTION] = bank_square(c->friction_sd);
     part->p[MOTION][MOTION] = bank_square(c->motion_share);
     f->parts++;
 }
@@ -138,7 +153,10 @@ void nav_contact_bank_begin(struct nav_contact_filter *f, const struct nav_conta
         struct nav_contact_part round = {.moving = moving}, end = {.tip = true, .moving = moving};
         bank_spread(f, step, &corner, CORNERS, LEAST_ARC, tip, share);
         bank_spread(f, step, &round, ROUNDS, LEAST_ARC, tip, share);
-        bank_spread(f, step, &end, NORMALS, FIRST_NORMAL, FIRST_NORMAL + NORMALS * NORMAL_STEP, share);
+        double hops = moving ? 0.0 : HOPS, last = FIRST_NORMAL + NORMALS * NORMAL_STEP;
+        bank_spread(f, step, &end, NORMALS, FIRST_NORMAL, last, (1.0 - hops) * share);
+        end.hops = true;
+        bank_spread(f, step, &end, NORMALS, FIRST_NORMAL, last, hops * share);
     }
     struct nav_contact_part caught = {.corner = true, .caught = true};
     bank_spread(f, step, &caught, CORNERS, LEAST_ARC, tip, c->caught);
@@ -179,15 +197,40 @@ static double bank_path(const struct nav_contact_filter *f, const struct nav_con
     return hypot(step->moved[0], step->moved[1]) / f->config.cone_m + fabs(step->turned) * f->beam->tip;
 }
 
-/* Blocks of the base's motion differ by a share; a moving object's velocity wanders. */
+/* FRICTION forgets all but a share of itself. */
+static void bank_wander(struct nav_contact_part *part, double stays, double variance)
+{
+    part->s[FRICTION] *= stays;
+    for (int k = 0; k < N; k++) {
+        part->p[k][FRICTION] *= stays;
+        part->p[FRICTION][k] *= stays;
+    }
+    part->p[FRICTION][FRICTION] += (1.0 - stays * stays) * variance;
+}
+
+/* Sets a state anew: nothing else tells of it. */
+static void bank_set(struct nav_contact_part *part, int k, double mean, double sd)
+{
+    for (int i = 0; i < N; i++)
+        part->p[k][i] = part->p[i][k] = 0.0;
+    part->s[k] = mean;
+    part->p[k][k] = bank_square(sd);
+}
+
+/* A surface's curvature changes along the way; blocks of the base's motion differ by a share; a moving object's
+ * velocity wanders. */
 static void bank_noise(const struct nav_contact_filter *f, const struct nav_contact_step *step,
                        struct nav_contact_part *part, nav_contact_square by)
 {
     const struct nav_contact_filter_config *c = &f->config;
-    double variance = bank_square(c->motion_share * bank_path(f, step) / step->seconds);
+    double path = bank_path(f, step), variance = bank_square(c->motion_share * path / step->seconds);
     for (int i = 0; i < 2; i++)
         for (int j = 0; j < 2; j++)
             part->p[i][j] += variance * (by[i][SPEED_X] * by[j][SPEED_X] + by[i][SPEED_Y] * by[j][SPEED_Y]);
+    if (!part->corner)
+        part->p[ROUND][ROUND] += bank_square(CURVING * c->cone_m) * 1e3 * c->cone_m * path;
+    if (part->hops)
+        bank_wander(part, exp(-path / HOP_WAY), bank_chatter(f));
     if (!part->moving)
         return;
     for (int k = SPEED_X; k <= SPEED_Y; k++)
@@ -274,12 +317,14 @@ static double bank_margin(const struct nav_contact_filter *f, const struct nav_c
 static void bank_turn(const struct nav_contact_filter *f, struct nav_contact_part *part)
 {
     double *s = part->s, sd = part->tip ? EDGE : FLAT;
-    for (int k = 0; k < N; k++)
-        part->p[FIRST][k] = part->p[k][FIRST] = 0.0;
+    bool hops = part->hops;
     part->tip = !part->tip;
-    part->grip = -part->grip; /* along the whisker it is the other way than over the surface */
-    s[FIRST] = part->tip ? s[SLOPE] + QUARTER + part->grip * atan(s[FRICTION]) + 0.8 * sd : f->beam->tip - 0.8 * sd;
-    part->p[FIRST][FIRST] = bank_square(0.6 * sd);
+    part->hops = false;
+    part->grip = hops ? 1.0 : -part->grip; /* along the whisker it is the other way than over the surface */
+    if (hops)
+        bank_set(part, FRICTION, f->config.friction, f->config.friction_sd);
+    double edge = s[SLOPE] + QUARTER + part->grip * atan(s[FRICTION]);
+    bank_set(part, FIRST, part->tip ? edge + 0.8 * sd : f->beam->tip - 0.8 * sd, 0.6 * sd);
     if (!part->tip)
         s[ROUND] = fmax(s[ROUND], 0.0);
 }
@@ -291,7 +336,7 @@ static bool bank_regime(struct nav_contact_filter *f, struct nav_contact_part *p
     double by[N], with[N];
     if (part->other)
         return true;
-    part->s[FRICTION] = fmin(fmax(part->s[FRICTION], 0.0), 0.5);
+    part->s[FRICTION] = fmin(fmax(part->s[FRICTION], part->hops ? -0.5 : 0.0), 0.5);
     if (part->s[SLOPE] < 0.0)
         return true;
     double margin = bank_margin(f, part, by), v = bank_variance(part, by, with) + TINY;
@@ -347,6 +392,34 @@ static void bank_keep(struct nav_contact_filter *f, int *kept, int i)
     ++*kept;
 }
 
+/* The likeliest surface that stands under the tip, or NULL. */
+static const struct nav_contact_part *bank_likeliest_tip(const struct nav_contact_filter *f)
+{
+    const struct nav_contact_part *best = NULL;
+    for (int i = 0; i < f->parts; i++)
+        if (f->part[i].tip && !f->part[i].moving && (best == NULL || f->part[i].log_weight > best->log_weight))
+            best = &f->part[i];
+    return best;
+}
+
+/* A face may end in this block: its tip has slid off, and the shaft lies on the edge. */
+static void bank_end(struct nav_contact_filter *f, const struct nav_contact_step *step)
+{
+    const struct nav_contact_part *tip = bank_likeliest_tip(f);
+    double path = bank_path(f, step);
+    if (tip == NULL || f->parts >= NAV_CONTACT_PARTS || tip->s[SLOPE] <= 0.0 || tip->grip < 0.0 || !(path > 0.0))
+        return;
+    struct nav_contact_part edge = *tip;
+    edge.corner = true;
+    edge.tip = edge.hops = false;
+    edge.log_weight += log(path * f->config.cone_m / FACE_M);
+    bank_set(&edge, FIRST, f->beam->tip - 0.5 * path, 0.5 * path + EDGE);
+    bank_set(&edge, ROUND, 0.0, 0.0);
+    bank_set(&edge, FRICTION, f->config.friction, f->config.friction_sd);
+    if (bank_slope(f, &edge, step->tilt))
+        f->part[f->parts++] = edge;
+}
+
 void nav_contact_bank_step(struct nav_contact_filter *f, const struct nav_contact_step *step)
 {
     int kept = 0;
@@ -363,6 +436,7 @@ void nav_contact_bank_step(struct nav_contact_filter *f, const struct nav_contac
     for (int i = kept - 1; i >= 0; i--)
         if (!bank_regime(f, &f->part[i]))
             f->part[i] = f->part[--f->parts];
+    bank_end(f, step);
     if (f->parts == 1 && f->part[0].other) /* it does not end a contact: all begins anew */
         f->parts = 0;
     bank_normalise(f);
@@ -373,7 +447,7 @@ void nav_contact_bank_step(struct nav_contact_filter *f, const struct nav_contac
 static bool bank_same(const struct nav_contact_part *a, const struct nav_contact_part *b)
 {
     if (a->other || b->other || a->tip != b->tip || a->corner != b->corner || a->moving != b->moving ||
-        a->caught != b->caught || a->grip * b->grip < 0.0)
+        a->caught != b->caught || a->hops != b->hops || a->grip * b->grip < 0.0)
         return false;
     for (int k = 0; k < N; k++)
         if (!(bank_square(a->s[k] - b->s[k]) <= bank_square(SAME) * fmax(a->p[k][k], b->p[k][k]) + TINY))
@@ -444,16 +518,23 @@ void nav_contact_bank_see(const struct nav_contact_filter *f, const struct nav_c
     }
     by[SEEN_VX][SPEED_X] = by[SEEN_VY][SPEED_Y] = cone;
     by[SEEN_ARC][FIRST] = part->tip ? 0.0 : cone;
-    by[SEEN_FRICTION][FRICTION] = 1.0;
+    by[SEEN_FRICTION][FRICTION] = part->hops ? 0.0 : 1.0;
     by[SEEN_CURVATURE][ROUND] = 1.0 / cone;
     memcpy(cov, part->p, sizeof(nav_contact_square));
     bank_carry(cov, by);
     cov[SEEN_X][SEEN_X] += bank_square(POINT_LEAST_M);
     cov[SEEN_Y][SEEN_Y] += bank_square(POINT_LEAST_M);
     cov[SEEN_NORMAL][SEEN_NORMAL] += bank_square(NORMAL_LEAST);
+    if (part->hops)
+        cov[SEEN_FRICTION][SEEN_FRICTION] = bank_square(f->config.friction_sd);
     const double *s = part->s;
-    const double seen[N] = {cone * look.q[0],  cone * look.q[1], cone * s[SPEED_X],
-                            cone * s[SPEED_Y], look.normal,      cone * (part->tip ? f->beam->tip : s[FIRST]),
-                            s[FRICTION],       s[ROUND] / cone};
+    const double seen[N] = {cone * look.q[0],
+                            cone * look.q[1],
+                            cone * s[SPEED_X],
+                            cone * s[SPEED_Y],
+                            look.normal,
+                            cone * (part->tip ? f->beam->tip : s[FIRST]),
+                            part->hops ? f->config.friction : s[FRICTION],
+                            s[ROUND] / cone};
     memcpy(mean, seen, sizeof seen);
 }

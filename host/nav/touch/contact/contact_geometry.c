@@ -266,6 +266,8 @@ static bool geometry_follow(struct problem *p, struct nav_contact_part *part, do
                             struct equations *e)
 {
     const struct nav_contact_part before = *part;
+    if (part->hops && before.s[SLOPE] > 0.0)
+        return geometry_slide(p, part, 1.0, now, e);
     if (before.s[SLOPE] <= 0.0)
         return geometry_slide(p, part, 0.0, now, e);
     if (grip != 0.0 && geometry_slide(p, part, grip, now, e) && e->slid * grip > -STILL)

@@ -37,6 +37,7 @@ struct nav_contact_filter_config {
 struct nav_contact_part {
     bool tip, corner, moving, slips;
     bool caught; /* the object goes along with the shaft */
+    bool hops;   /* the tip chatters over its surface: FRICTION is signed, the mean of a block */
     bool other;  /* none of these: the tilt alone is followed, and its rate over the base's way */
     double log_weight;
     double s[NAV_CONTACT_STATES];

@@ -20,7 +20,7 @@ SETTINGS = {
     "gain_sd": 0.01,
     "model_share": 0.02,
     "friction": 0.3,
-    "friction_sd": 0.05,
+    "friction_sd": 0.115,  # anywhere from 0.1 to 0.5: resin on wood, plastic, steel
     "motion_share": 0.01,
     "ring_hz": 40.0,
     "ring_damping": 0.1,
