@@ -43,10 +43,10 @@ ABOUT = {
     "crunchbot-site.tar.gz": "all pages, and the API of C and Python, to be read without a network",
     "crunchbot-source.tar.gz": "sources",
     "sbom.json": "software bill of materials (CycloneDX)",
+    "*.wgw": "update of the board it is named by, for `whisker flash`",
     "*-testid.*": "bitstream of the board it is named by, with a USB number for tests only",
     "*.bit": "bitstream of the board it is named by",
     "*.fs": "bitstream of the board it is named by",
-    "*.wgw": "update of the board it is named by, for `whisker flash`",
 }
 
 
