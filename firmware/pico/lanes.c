@@ -158,8 +158,8 @@ static void lanes_mend(uint32_t mask)
 void lanes_read(uint32_t mask, struct sensor_reading readings[BOARD_LANES])
 {
     now = (struct now){readings, mask, {BOARD_LANE_NONE, BOARD_LANE_NONE}};
-    for (uint8_t lane = 0; (mask & ~before) >> lane != 0; lane++)
-        if (sensors[lane].kind == SENSOR_TMAG5170 && !(before >> lane & 1u))
+    for (uint8_t lane = 0; (before & ~mask) >> lane != 0; lane++) /* those left, for a tick of a run has no time */
+        if ((before & ~mask) >> lane & 1u && sensors[lane].kind == SENSOR_TMAG5170)
             sensors[lane].sets = TMAG5170_SETS_NONE;
     before = mask;
     for (uint8_t lane = 0; (mask & damaged) >> lane != 0; lane++)
