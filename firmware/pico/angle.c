@@ -1,5 +1,4 @@
-/* Angles of a field as the MLX90333 gives them: count 0x8000 along the third axis, 65536 counts for 180 degrees. */
-#include "sensor.h"
+#include "angle.h"
 
 #include "rp2040.h"
 

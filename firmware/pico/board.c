@@ -1,7 +1,6 @@
 #include "board.h"
 
 #include "rp2040.h"
-#include "whisker_protocol.h" // WHISKER_CODE_*
 
 /* Pins (docs/first_whisker.md; tests/repository holds table and picture against these lines). */
 static const uint8_t PIN_SELECT[BOARD_LANES] = {5, 16, 6, 17, 7, 18, 8, 19, 9, 20, 13, 21, 14, 26, 15, 27};
@@ -82,19 +81,19 @@ static void board_pins(void)
     board_set_mode(false);
 }
 
-static uint8_t board_cause(void)
+static enum board_start board_cause(void)
 {
     const bool fault = REG(WATCHDOG_SCRATCH0) == FAULT_MARK;
     REG(WATCHDOG_SCRATCH0) = 0;
     if (REG(WATCHDOG_REASON) != 0)
-        return fault ? WHISKER_CODE_RESET_TRAP : WHISKER_CODE_RESET_WATCHDOG;
-    return REG(CHIP_RESET) & CHIP_RESET_RUN ? WHISKER_CODE_RESET_POWER : WHISKER_CODE_STARTING;
+        return fault ? BOARD_START_FAULT : BOARD_START_WATCHDOG;
+    return REG(CHIP_RESET) & CHIP_RESET_RUN ? BOARD_START_PIN : BOARD_START_POWER;
 }
 
-uint8_t board_init(void)
+enum board_start board_init(void)
 {
     const uint32_t wanted = RESET_IO | RESET_PADS | RESET_PLLS | RESET_SPI | RESET_TIMER | RESET_USB;
-    const uint8_t cause = board_cause();
+    const enum board_start cause = board_cause();
     CLEAR(RESETS) = RESET_PLLS;
     board_clocks();
     CLEAR(RESETS) = wanted;

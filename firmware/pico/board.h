@@ -11,8 +11,10 @@
 #define BOARD_TRANSFER_MAX 4u   /* words of 16 bits: the SPI's FIFO holds twice as many */
 #define BOARD_CYCLES_PER_US 60u /* of the protocol's clock; the processor has twice as many */
 
-/* Clocks, pins, buses. Returns why the chip began anew: a kind of reset, or, at power-up, WHISKER_CODE_STARTING. */
-uint8_t board_init(void);
+enum board_start { BOARD_START_POWER, BOARD_START_PIN, BOARD_START_WATCHDOG, BOARD_START_FAULT };
+
+/* Clocks, pins, buses. Returns why the chip began anew. */
+enum board_start board_init(void);
 
 /* Begins to send the same n words to a lane on each bus, at once; BOARD_LANE_NONE leaves a bus alone. in_mode_3: the
  * clock idles high. Then board_receive() with the same lanes. */

@@ -4,6 +4,7 @@
 #include "rp2040.h"
 #include "stream.h"
 #include "usb.h"
+#include "whisker_protocol.h"
 
 extern uint32_t stack_top[], bss_start[], bss_end[];
 
@@ -12,6 +13,14 @@ extern uint32_t stack_top[], bss_start[], bss_end[];
 #define PRIORITY_USB 1u /* the tick's is 0 */
 #define PRIORITY_READING 2u
 #define LEAVE_US 20000u /* until the host has the confirmation of its order for the boot drive */
+
+static uint8_t main_code_of(enum board_start start)
+{
+    return start == BOARD_START_PIN        ? WHISKER_CODE_RESET_POWER
+           : start == BOARD_START_WATCHDOG ? WHISKER_CODE_RESET_WATCHDOG
+           : start == BOARD_START_FAULT    ? WHISKER_CODE_RESET_TRAP
+                                           : WHISKER_CODE_STARTING;
+}
 
 static void main_priority(uint32_t irq, uint32_t priority)
 {
@@ -39,7 +48,7 @@ static void main_start(void)
     for (uint32_t *at = bss_start; at < bss_end; at++)
         *at = 0;
     const uint64_t number = board_number();
-    lanes_start(board_init());
+    lanes_start(main_code_of(board_init()));
     main_priority(IRQ_USB, PRIORITY_USB);
     main_priority(IRQ_TIMER0, PRIORITY_READING);
     usb_start(number);

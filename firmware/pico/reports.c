@@ -21,6 +21,20 @@ static struct order_asked asked, shown;
 static uint8_t sequence;
 static bool boot_drive;
 
+static void reports_counters(uint8_t *bytes)
+{
+    struct stream_counters counters;
+    stream_count(&counters);
+    bytes[WHISKER_REPORT_COUNTERS_RUNNING] = stream_runs();
+    whisker_put_u32(bytes + WHISKER_REPORT_COUNTERS_TICKS, counters.ticks);
+    whisker_put_u32(bytes + WHISKER_REPORT_COUNTERS_FRAMES, counters.frames);
+    whisker_put_u32(bytes + WHISKER_REPORT_COUNTERS_DROPPED, counters.dropped);
+    whisker_put_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_GOOD, counters.good);
+    whisker_put_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_ABSENT, counters.absent);
+    whisker_put_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_CRC, counters.crc);
+    whisker_put_u32(bytes + WHISKER_REPORT_COUNTERS_RECORDS_TICK, counters.stale);
+}
+
 static void reports_identity(uint8_t *bytes)
 {
     bytes[WHISKER_REPORT_IDENTITY_LANES] = WHISKER_LIMIT_LANES;
@@ -77,7 +91,7 @@ uint32_t reports_get(uint8_t id, uint8_t bytes[REPORTS_BYTES_MAX])
         bytes[1] = WHISKER_WIRE_VERSION;
         return WHISKER_REPORT_CONTROL_BYTES;
     case WHISKER_REPORT_ID_COUNTERS:
-        stream_tell_counters(bytes);
+        reports_counters(bytes);
         return WHISKER_REPORT_COUNTERS_BYTES;
     case WHISKER_REPORT_ID_IDENTITY:
         reports_identity(bytes);

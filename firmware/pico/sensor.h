@@ -4,12 +4,8 @@
 
 #include <stdint.h>
 
+#include "angle.h" // struct field
 #include "board.h" // BOARD_LANES
-
-/* A field, in any unit: 32767 is the sensor's full range. */
-struct field {
-    int32_t x, y, z;
-};
 
 enum sensor_kind { SENSOR_NONE, SENSOR_TMAG5170, SENSOR_MLX90393 };
 
@@ -30,12 +26,5 @@ struct sensor_result {
     struct field field;
     uint8_t code;
 };
-
-/* Angle of the field towards `side`, seen from `axis`: within a count of the exact one. A magnet turned around gives
- * the same: both components change their sign. */
-uint16_t angle_of(int32_t side, int32_t axis);
-
-/* Square of the field's strength. */
-uint32_t angle_strength(const struct field *field);
 
 #endif

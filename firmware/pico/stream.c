@@ -28,9 +28,7 @@ static uint64_t now_cycles;
 static uint16_t sof_number, usb_time;
 static uint32_t sof_us, sof_cycles;
 static bool sof_seen;
-static struct {
-    uint32_t ticks, frames, dropped, good, absent, crc, stale;
-} counters;
+static struct stream_counters counters;
 static void (*wake)(void);
 
 uint32_t stream_lanes(void)
@@ -274,16 +272,9 @@ bool stream_runs(void)
     return running;
 }
 
-void stream_tell_counters(uint8_t *report)
+void stream_count(struct stream_counters *to)
 {
-    report[WHISKER_REPORT_COUNTERS_RUNNING] = running;
-    whisker_put_u32(report + WHISKER_REPORT_COUNTERS_TICKS, counters.ticks);
-    whisker_put_u32(report + WHISKER_REPORT_COUNTERS_FRAMES, counters.frames);
-    whisker_put_u32(report + WHISKER_REPORT_COUNTERS_DROPPED, counters.dropped);
-    whisker_put_u32(report + WHISKER_REPORT_COUNTERS_RECORDS_GOOD, counters.good);
-    whisker_put_u32(report + WHISKER_REPORT_COUNTERS_RECORDS_ABSENT, counters.absent);
-    whisker_put_u32(report + WHISKER_REPORT_COUNTERS_RECORDS_CRC, counters.crc);
-    whisker_put_u32(report + WHISKER_REPORT_COUNTERS_RECORDS_TICK, counters.stale);
+    *to = counters;
 }
 
 void stream_tell_timing(uint8_t *report)

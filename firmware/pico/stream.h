@@ -14,6 +14,10 @@
 
 #define STREAM_PACKET 64u /* bytes: USB at full speed */
 
+struct stream_counters {
+    uint32_t ticks, frames, dropped, good, absent, crc, stale;
+};
+
 /* The ticks begin; no run. `frames_are_there` is called, interrupts off, when there are frames to send. */
 void stream_start(void (*frames_are_there)(void));
 
@@ -39,9 +43,9 @@ void stream_read(void);
 int stream_next(const uint8_t **bytes);
 
 bool stream_runs(void);
+void stream_count(struct stream_counters *counters);
 
-/* The reports `counters` and `timing`, but for their first two bytes. */
-void stream_tell_counters(uint8_t *report);
+/* The report `timing`, but for its first two bytes. */
 void stream_tell_timing(uint8_t *report);
 
 /* Lanes in use, as the host has set them. */

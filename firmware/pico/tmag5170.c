@@ -22,26 +22,26 @@
 
 enum step { FIND, CONFIGURE, COMPARE };
 
-/* Bits of a nibble's place: of the first channel's three, of the second's three, of the status. Bits that are the same
- * in both frames of a reading: Y, and the number of the conversion. Each twice: with the CRC of the data sheet, and
- * with its last bit inverted, as TI E2E 1199728 saw it. */
+/* Bits of a nibble's place: of the first channel's three, of the second's three, of the status. Whether the CRC's last
+ * bit is inverted. Bits that are the same in both frames of a reading: Y, and the number of the conversion. */
 struct layout {
-    uint8_t shift[6], status;
+    uint8_t shift[6], status, inverted;
     uint32_t same;
 };
-#define LAYOUT(a, b, c, d, e, f, status)                                                                               \
+#define LAYOUT(a, b, c, d, e, f, status, inverted)                                                                     \
     {                                                                                                                  \
-        {a, b, c, d, e, f}, status, 0xFu << d | 0xFu << e | 0xFu << f | SETS_MASK << status                            \
+        {a, b, c, d, e, f}, status, inverted, 0xFu << d | 0xFu << e | 0xFu << f | SETS_MASK << status                  \
     }
 static const struct layout LAYOUTS[] = {
-    LAYOUT(16, 12, 4, 24, 20, 8, 28), /* the maker's code */
-    LAYOUT(24, 20, 16, 12, 8, 4, 28), /* one axis behind the other */
-    LAYOUT(20, 16, 8, 28, 24, 12, 4), /* the data sheet of 2021: status last */
+    LAYOUT(16, 12, 4, 24, 20, 8, 28, 0),                                      /* the maker's code */
+    LAYOUT(16, 12, 4, 24, 20, 8, 28, 1),                                      /* and a CRC as TI E2E 1199728 saw it */
+    LAYOUT(24, 20, 16, 12, 8, 4, 28, 0), LAYOUT(24, 20, 16, 12, 8, 4, 28, 1), /* one axis behind the other */
+    LAYOUT(20, 16, 8, 28, 24, 12, 4, 0), LAYOUT(20, 16, 8, 28, 24, 12, 4, 1), /* the data sheet of 2021: status last */
 };
-#define LAYOUT_PLAIN (2u * (sizeof LAYOUTS / sizeof LAYOUTS[0]))
-#define CRC4 0x30u /* x^4 + x + 1 without its first term, above four bits of nothing */
+#define LAYOUT_COUNT (sizeof LAYOUTS / sizeof LAYOUTS[0])
+#define LAYOUT_PLAIN LAYOUT_COUNT
 
-/* CRC from 0xF over the upper 28 bits: the register after each byte; and whole words to send. */
+/* x^4 + x + 1 from 0xF over the upper 28 bits; the register after each byte, and whole words to send. */
 static uint8_t crc_after[256];
 static uint32_t pairs[2], plains[AXES];
 /* Answers that wait to be taken apart. */
@@ -81,12 +81,9 @@ static uint32_t tmag5170_ask(uint32_t number)
 
 void tmag5170_start(void)
 {
-    for (uint32_t i = 0; i < sizeof crc_after; i++) {
-        uint32_t crc = i;
-        for (uint32_t bit = 0; bit < 8; bit++)
-            crc = crc << 1 ^ (crc & 0x80u ? CRC4 : 0);
-        crc_after[i] = crc >> 4 & 0xFu;
-    }
+    static const uint8_t AFTER[16] = {0, 3, 6, 5, 12, 15, 10, 9, 11, 8, 13, 14, 7, 4, 1, 2};
+    for (uint32_t i = 0; i < sizeof crc_after; i++)
+        crc_after[i] = AFTER[AFTER[i >> 4] ^ (i & 0xFu)];
     pairs[0] = tmag5170_whole(tmag5170_write(SYSTEM_CONFIG, TRIGGER_ALERT | TYPE_ZY));
     pairs[1] = tmag5170_whole(tmag5170_write(SYSTEM_CONFIG, TRIGGER_ALERT | TYPE_XY));
     for (uint32_t i = 0; i < AXES; i++)
@@ -119,9 +116,10 @@ static int32_t tmag5170_register(uint32_t word)
 static uint8_t tmag5170_layout_of(uint32_t word, int32_t x, int32_t y)
 {
     uint8_t found = LAYOUT_PLAIN;
-    for (uint8_t i = 0; i < LAYOUT_PLAIN; i++) {
-        const struct layout *layout = &LAYOUTS[i / 2u];
-        if (tmag5170_judge(word, i % 2u) == WHISKER_CODE_OK && tmag5170_channel(word, layout->shift) == (x & ~0xF) &&
+    for (uint8_t i = 0; i < LAYOUT_COUNT; i++) {
+        const struct layout *layout = &LAYOUTS[i];
+        if (tmag5170_judge(word, layout->inverted) == WHISKER_CODE_OK &&
+            tmag5170_channel(word, layout->shift) == (x & ~0xF) &&
             tmag5170_channel(word, layout->shift + 3) == (y & ~0xF)) {
             if (found != LAYOUT_PLAIN)
                 return LAYOUT_PLAIN;
@@ -167,13 +165,13 @@ bool tmag5170_step(struct sensor *sensor, uint8_t lane)
 
 static void tmag5170_take_one(struct sensor *sensor, struct sensor_result *result, const uint32_t words[AXES])
 {
-    const struct layout *pair = sensor->layout == LAYOUT_PLAIN ? NULL : &LAYOUTS[sensor->layout / 2u];
+    const struct layout *pair = sensor->layout == LAYOUT_PLAIN ? NULL : &LAYOUTS[sensor->layout];
     const uint32_t status = pair ? pair->status : STATUS_OF_PLAIN;
     const uint8_t before = sensor->sets;
     sensor->sets = TMAG5170_SETS_NONE; /* after a damaged reading the next one's number says nothing */
     result->code = WHISKER_CODE_OK;
     for (uint32_t i = 0; i < (pair ? 2u : AXES) && result->code == WHISKER_CODE_OK; i++)
-        result->code = tmag5170_judge(words[i], pair ? sensor->layout % 2u : 0);
+        result->code = tmag5170_judge(words[i], pair ? pair->inverted : 0);
     /* Four bits of CRC alone let one damaged frame in 16 through. */
     if (result->code == WHISKER_CODE_OK &&
         (pair ? (words[0] ^ words[1]) & pair->same

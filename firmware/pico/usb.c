@@ -76,11 +76,10 @@ static void usb_take(void)
     usb_buffer(DPRAM_BUFFER_OUT0, PACKET | BUFFER_DATA1);
 }
 
-static bool usb_confirm(void)
+static void usb_confirm(void)
 {
     confirming = true;
     usb_send(0, incoming, 0);
-    return true;
 }
 
 static void usb_reply_on(void)
@@ -98,8 +97,9 @@ static bool usb_reply(const uint8_t *bytes, uint32_t n, uint32_t wanted)
     reply_left = n < wanted ? n : wanted;
     reply_short = n < wanted;
     if (wanted == 0)
-        return usb_confirm();
-    usb_reply_on();
+        usb_confirm();
+    else
+        usb_reply_on();
     return true;
 }
 
@@ -108,6 +108,12 @@ static bool usb_reply_byte(uint32_t value, const struct setup *s)
     answer[0] = (uint8_t)value;
     answer[1] = 0;
     return usb_reply(answer, s->kind == REQUEST(0x80u, 8u) || s->kind >= REQUEST(0x81u, 2u) ? 1 : 2, s->length);
+}
+
+static bool usb_done(void)
+{
+    usb_confirm();
+    return true;
 }
 
 void usb_stream(void)
@@ -158,7 +164,7 @@ static bool usb_configure(uint8_t value)
     busy = false;
     usb_fresh(1);
     usb_fresh(2);
-    return usb_confirm();
+    return usb_done();
 }
 
 /* 1 or 2, if that is an endpoint of the present configuration; 0: the control endpoint; ENDPOINTS: none. */
@@ -181,7 +187,7 @@ static bool usb_halt(const struct setup *s, bool on)
     } else if (endpoint > 0) {
         usb_fresh(endpoint);
     }
-    return usb_confirm();
+    return usb_done();
 }
 
 static bool usb_is_interface(const struct setup *s)
@@ -203,7 +209,7 @@ static bool usb_standard(const struct setup *s)
         return usb_halt(s, s->kind == REQUEST(0x02u, 3u));
     case REQUEST(0x00u, 5u): /* SET_ADDRESS */
         new_address = (uint8_t)s->value;
-        return s->value < ADDRESSES && s->index == 0 && s->length == 0 && !configuration && usb_confirm();
+        return s->value < ADDRESSES && s->index == 0 && s->length == 0 && !configuration && usb_done();
     case REQUEST(0x80u, 6u): /* GET_DESCRIPTOR */
     case REQUEST(0x81u, 6u):
         return usb_describe(s);
@@ -218,7 +224,7 @@ static bool usb_standard(const struct setup *s)
         if (!usb_is_interface(s) || s->length != 0)
             return false;
         usb_fresh(s->index + 1u);
-        return usb_confirm();
+        return usb_done();
     default:
         return false;
     }
@@ -245,7 +251,7 @@ static bool usb_class(const struct setup *s)
         return usb_reply_byte(idle_rate, s);
     case REQUEST(0x21u, 10u): /* SET_IDLE */
         idle_rate = (uint8_t)(s->value >> 8);
-        return s->length == 0 && usb_confirm();
+        return s->length == 0 && usb_done();
     default:
         return false;
     }
