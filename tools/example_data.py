@@ -24,14 +24,7 @@ from crunchbot.scene import load
 from crunchbot_lab.demo.training import flat
 from crunchbot_lab.scenes.files import write_scene
 from crunchbot_lab.scenes.making import make
-from crunchbot_lab.signals.recordings import (
-    REST_S,
-    WHISK_RAD_S,
-    radial_contacts,
-    write_radial_contacts,
-    write_surface_drives,
-)
-from crunchbot_lab.signals.world import TICK_S
+from crunchbot_lab.signals.recordings import radial_contacts, write_radial_contacts, write_surface_drives
 from crunchbot_lab.simulation.scenes import make_scene as demo_scene
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -78,29 +71,12 @@ def make_touch(folder: Path) -> None:
         path.rename(place)
     shutil.rmtree(drives)
     whisker = scene.robot.of_role("object")[0].name
-    contacts = radial_contacts(flat(scene), whisker, SEED, REPEATS, PUSH_S)
-    write_radial_contacts(folder / "contacts.csv", contacts)
-    add_rates(folder / "contacts.csv", np.concatenate([commanded(len(contact.counts)) for contact in contacts]))
-
-
-def commanded(samples: int) -> np.ndarray:
-    """Turning rate of the base (samples,) in rad/s: it rests, turns as long towards the post as back, and rests."""
-    rest = round(REST_S / TICK_S)
-    rates, turn = np.zeros(samples), (samples - 2 * rest) // 2
-    rates[rest : rest + turn], rates[rest + turn : rest + 2 * turn] = WHISK_RAD_S, -WHISK_RAD_S
-    return rates
-
-
-def add_rates(path: Path, rates: np.ndarray) -> None:
-    """The column whisk_rad_s of a file of contacts, for each sample."""
-    head, *lines = path.read_text().splitlines()
-    cells = [f"{line},{rate:.6g}" for line, rate in zip(lines, rates, strict=True)]
-    path.write_text("\n".join([f"{head},whisk_rad_s", *cells]) + "\n")
+    write_radial_contacts(folder / "contacts.csv", radial_contacts(flat(scene), whisker, SEED, REPEATS, PUSH_S))
 
 
 def make_models(folder: Path) -> None:
     """What the commands learn from those."""
-    fit = ["radial", "fit", "contacts.csv", "--model", "whisk", "--out", "radial.json"]  # `radial follow` asks for one
+    fit = ["radial", "fit", "contacts.csv", "--out", "radial.json"]
     for words in (["texture", "train", "surfaces", "--out", "texture.json"], fit):
         subprocess.run([*WHISKER, *words], cwd=folder, check=True)
 

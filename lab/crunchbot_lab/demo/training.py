@@ -101,7 +101,7 @@ def fit_texture(recordings: dict[str, list[np.ndarray]], seed: int) -> TextureMo
 
 
 def calibrate(folder: Path, scene: Scene, name: str, seed: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Whisk one whisker against a corner at known distances: the pilot's model of whole whisks into the folder.
+    """Whisk one whisker against a corner at known distances: its line, and its plug for the pilot, into the folder.
 
     Returns the contacts: {"fit", "held out"} -> (radius mm (n,), peak counts (n,)).
     """
@@ -109,7 +109,7 @@ def calibrate(folder: Path, scene: Scene, name: str, seed: int) -> dict[str, tup
     path.parent.mkdir(parents=True, exist_ok=True)
     write_radial_contacts(path, _contacts(scene, name, 2 * seed, FIT_CONTACTS))
     whisks = read_whisks(path, with_radius=True)
-    save(fit(whisks, "whisk").model, folder / f"{name}.json")
+    save(fit(whisks, "linear").model, folder / f"{name}.json")
     tests = _contacts(scene, name, 2 * seed + 1, HELD_OUT_CONTACTS)
     radii = np.array([contact.radius_mm for contact in tests])
     peaks = np.array([peak(c.counts, np.median(c.counts[: REST_SAMPLES // 4], axis=0)) for c in tests])
@@ -156,7 +156,7 @@ def flat(scene: Scene) -> str:
 def _contacts(scene: Scene, name: str, seed: int, repeats: int) -> list:
     """Whisks cut where the pilot's push ends: 0.6 s after the onset that it would notice, so that peaks compare."""
     contacts = radial_contacts(flat(scene), name, seed, repeats, RECORDED_PUSH_S)
-    return [contact._replace(counts=contact.counts[: _onset(contact.counts) + PUSH_TICKS]) for contact in contacts]
+    return [contact.until(_onset(contact.counts) + PUSH_TICKS) for contact in contacts]
 
 
 def _onset(counts: np.ndarray) -> int:

@@ -1,7 +1,7 @@
 """Recordings for training and calibration, made with the same world that the robot later drives in.
 
 Files follow the project's formats: texture recordings are one folder per surface with CSV files `t_s,x,y`; radial
-calibration is one CSV file per whisker, `contact,radius_mm,t_s,x,y`. x and y are raw counts at 2 kHz.
+calibration is one CSV file per whisker, `contact,radius_mm,t_s,whisk_rad_s,x,y`. x and y are raw counts at 2 kHz.
 """
 
 import math
@@ -43,6 +43,11 @@ class RadialContact(NamedTuple):
 
     radius_mm: float
     counts: np.ndarray  # (n, 2) raw counts: rest, push, back, rest
+    whisk_rad_s: np.ndarray  # (n,) commanded, positive towards the post
+
+    def until(self, end: int) -> "RadialContact":
+        """Its first `end` samples."""
+        return RadialContact(self.radius_mm, self.counts[:end], self.whisk_rad_s[:end])
 
 
 def surface_drive(
@@ -142,18 +147,22 @@ def radial_contacts(
         scene, side = _post_scene(flat, whisker, radius_mm * 1e-3)
         world = World(scene, _derive(seed, *whisker.encode(), n))
         for _ in range(repeats):
-            contacts.append(RadialContact(radius_mm, _whisk(world, world.lanes.index(whisker), side, push_s)))
+            contacts.append(RadialContact(radius_mm, *_whisk(world, world.lanes.index(whisker), side, push_s)))
     return contacts
 
 
 def write_radial_contacts(path: Path, contacts: Sequence[RadialContact]) -> None:
     """Write one whisker's contacts; they are numbered from 0, and time starts at 0 in each."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    parts = [(f"{n},{contact.radius_mm:g},", contact.counts) for n, contact in enumerate(contacts)]
-    _write_csv(path, "contact,radius_mm,t_s,x,y", parts)
+    lines = ["contact,radius_mm,t_s,whisk_rad_s,x,y"]
+    for n, (radius_mm, counts, rates) in enumerate(contacts):
+        rows = enumerate(zip(rates, *counts.T.tolist(), strict=True))
+        lines += [f"{n},{radius_mm:g},{k * TICK_S:.4f},{rate:.6g},{x},{y}" for k, (rate, x, y) in rows]
+    put(path, "\n".join(lines) + "\n")
 
 
-def _whisk(world: World, lane: int, side: int, push_s: float) -> np.ndarray:
+def _whisk(world: World, lane: int, side: int, push_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Counts and commanded rate."""
     rest = round(REST_S / TICK_S)
     world.drive(0.0, 0.0)
     parts = [world.run(rest)]
@@ -172,7 +181,8 @@ def _whisk(world: World, lane: int, side: int, push_s: float) -> np.ndarray:
     parts.append(world.run(push + approach))
     world.drive(0.0, 0.0)
     parts.append(world.run(rest))
-    return np.concatenate(parts)[:, lane]
+    rates = np.repeat([0.0, WHISK_RAD_S, -WHISK_RAD_S, 0.0], [rest, approach + push, push + approach, rest])
+    return np.concatenate(parts)[:, lane], rates
 
 
 def _post_scene(flat: str, whisker: str, radius_m: float) -> tuple[str, int]:

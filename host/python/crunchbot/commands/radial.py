@@ -35,7 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     p.add_argument("--during", action="store_true", help=text)
     example = "whisker radial follow examples/radial.json examples/contacts.csv --json"
     p = add_action(actions, "follow", "estimate where each contact is while it is pressed", example, follow)
-    p.add_argument("model", help="of whole whisks: 'whisker radial fit --model whisk'")
+    p.add_argument("model", help="of any kind, from contacts that tell how the base moved")
     p.add_argument("contacts", help="CSV as for fit, with whisk_rad_s or push_mm_s; radius_mm is not read")
     p.add_argument("--json", action="store_true", help="one object per line, one every 20 ms at 2 kHz")
 
@@ -102,13 +102,14 @@ def _predict(arguments, model, contact: str, recorded: radial.Contact, peak: flo
 
 def follow(arguments: argparse.Namespace) -> int:
     model = radial.load(arguments.model)
-    if not isinstance(model, radial.WhiskModel):
-        raise TableError(arguments.model, None, "it is no model of whole whisks; fit with '--model whisk'")
+    if model.plug is None:
+        text = "it holds no plug; fit it anew, with the column whisk_rad_s, push_mm_s or depth_mm in the contacts"
+        raise TableError(arguments.model, None, text)
     whisks = radial.read_whisks(arguments.contacts, with_radius=False, warn=warn)
     check_node(model.node, whisks.node, arguments.model)
     for contact, recorded in zip(whisks.contact, whisks.recorded, strict=True):
         try:
-            held, bases, tilts = ContactFilter.calibrated(model, recorded)
+            held, bases, tilts = ContactFilter.calibrated(model.plug, recorded)
         except ValueError as error:
             raise TableError(arguments.contacts, 1, f"contact {contact}: {error}") from error
         reported = held.run(bases, tilts)

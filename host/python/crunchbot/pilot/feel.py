@@ -8,8 +8,8 @@ import numpy as np
 
 from ..scene import Whisker
 from ..touch.contact import Contact
-from ..touch.contact_filter import ContactFilter, Reports, cone_of
-from ..touch.radial.whisk import WhiskModel
+from ..touch.contact_filter import ContactFilter, Reports, settings_of
+from ..touch.radial.plug import CREEP, Plug
 from .states import TICK_S
 
 REST_BLOCKS = 2  # that give the rest: creep of an earlier contact may be left in the samples
@@ -66,26 +66,25 @@ class Felt:
 
 
 class Feeler:
-    """Follows the contacts of one whisker. Of the present or the last one: `felt`, None where nothing is known; `face`, the
-    probability that the tip is on a surface, as it was when the whisker was bent most (nan: not known)."""
+    """Follows the contacts of one whisker. Of the present or the last one: `felt`, None where nothing is known now; `last`, the
+    last that was known; `bent`, what was known when the whisker was bent most."""
 
-    def __init__(self, whisker: Whisker, calibrated_turn: float, model: WhiskModel, whisk_rad_s: float):
+    def __init__(self, whisker: Whisker, calibrated_turn: float, plug: Plug, whisk_rad_s: float):
         """`calibrated_turn`: sign of the turn that pressed it in calibration; `whisk_rad_s`: of calibration."""
-        self._base, self._yaw, self._model = whisker.base_m, whisker.yaw_rad, model
+        self._base, self._yaw, self._plug = whisker.base_m, whisker.yaw_rad, plug
         self._out = -calibrated_turn  # the filter's y axis is to the left of the whisker, or with -1 to its right
-        self._per_rad = model.counts_per_rad(whisk_rad_s)
+        self._per_rad = plug.counts_per_rad(whisk_rad_s)
         self._filter = ContactFilter(
-            whisker.length_m,
-            kappa=model.kappa,
-            cone_m=cone_of(model, whisker.length_m),
-            gain_sd=model.spread,
-            noise_rad=NOISE_COUNTS / self._per_rad,
+            whisker.length_m, noise_rad=NOISE_COUNTS / self._per_rad, **settings_of(plug, whisker.length_m)
         )
         self._recent: deque[tuple[np.ndarray, np.ndarray, np.ndarray]] = deque(maxlen=BLOCKS_BEFORE + 1)
         self._onset = -1
         self._rest: np.ndarray | None = None  # None: no object is followed
         self.felt: Felt | None = None
-        self.face, self._most = math.nan, 0.0
+        self.last: Felt | None = None
+        self.bent: Felt | None = None
+        self._most = 0.0
+        self._doubted = False  # what was known did not last while it was bent by more than creep leaves
 
     @property
     def not_read(self) -> dict[str, int]:
@@ -110,7 +109,8 @@ class Feeler:
             self._rest = None
             return
         if new:
-            self._onset, self.felt, self.face, self._most = contact.onset, None, math.nan, 0.0
+            self._onset, self.felt, self.last, self.bent = contact.onset, None, None, None
+            self._most, self._doubted = 0.0, False
         if self._rest is None or (new and not same):
             self._filter.begin()
             self._rest = _rest(list(self._recent)[:REST_BLOCKS], contact.rest)
@@ -123,11 +123,12 @@ class Feeler:
             or ticks[max(reported.sample[-1], 0)] < contact.onset + LEAST_TICKS
         ):
             return
-        known = reported.other[-1] < 0.5
-        self.felt = self._placed(reported, ticks) if known else None
+        self.felt = self._placed(reported, ticks) if reported.other[-1] < 0.5 else None
         bent = abs(float(np.median(tilts[:, 0])))
         if bent >= self._most:
-            self._most, self.face = bent, float(reported.tip[-1]) if known else math.nan
+            self._most, self.bent = bent, self.felt
+        self._doubted |= self.last is not None and self.felt is None and bent > CREEP * self._most
+        self.last = None if self._doubted else self.felt or self.last
 
     def _bases(self, drives: np.ndarray) -> np.ndarray:
         """(n, 3) motion of the follicle's exit in the filter's frame."""
@@ -137,7 +138,7 @@ class Feeler:
         return np.column_stack([c * x + s * y, self._out * (c * y - s * x), self._out * omega])
 
     def _tilts(self, off: np.ndarray) -> np.ndarray:
-        return np.column_stack([self._model.along(off), off @ self._model.side]) / self._per_rad
+        return np.column_stack([self._plug.along(off), off @ self._plug.side]) / self._per_rad
 
     def _placed(self, reported: Reports, ticks: np.ndarray) -> Felt:
         x, y = reported.point[-1]

@@ -8,7 +8,7 @@ The row of every 0.1 s is one of five kinds:
     first after it    odometry since the release
     carried           the base says that it may be anywhere: odometry infinite, nothing read
 
-Where an object whisker's model is one of whole whisks, a row that carries motion also reports the direction of the surface that is
+Where an object whisker's model holds its plug, a row that carries motion also reports the direction of the surface that is
 touched or was just let go, and where. Where it has a texture model, rows carry the texture of the face that its tip swept
 along in the last 200 samples.
 """
@@ -26,7 +26,7 @@ from ..touch.contact import Contact
 from ..touch.floor import WINDOW_LEAST_GOOD, WINDOW_SAMPLES, floor_whisker
 from ..touch.mount import Mount
 from ..touch.radial.model import Contact as Recorded
-from ..touch.radial.model import WhiskModel, estimate, peak
+from ..touch.radial.model import estimate, peak
 from .behaviour import BLOCK_TICKS, TICK_S, Behaviour, Habits, Whisk
 from .feel import SURE, Drives, Feeler, Felt
 from .states import FULL
@@ -34,6 +34,7 @@ from .tip import contact_type, move_for_tip
 from .wheels import EXACT, NO_BUMPS, Bumps, Wheels
 
 SETTLE_TICKS = 100  # the wheels' last change of speed must be this much older than a texture window
+NOWHERE = Felt(0, (math.nan, math.nan), math.inf)
 CATCH_WINDOWS = 8  # in a row without evidence, wheels driving and samples good: an edge crossed in passing holds the tip for half of it
 
 
@@ -59,11 +60,12 @@ class Pilot:
         self.contacts = {lane: Contact() for lane in self.object_lanes}
         self.mounts = {lane: Mount.of(robot.whiskers[lane]) for lane in self.object_lanes}
         self.feelers = {
-            lane: Feeler(robot.whiskers[lane], self.mounts[lane].calibrated_turn, model, wheels.whisk_rad_s)
+            lane: Feeler(robot.whiskers[lane], self.mounts[lane].calibrated_turn, model.plug, wheels.whisk_rad_s)
             for lane in self.object_lanes
-            if isinstance(model := radial_models.get(self.names[lane]), WhiskModel)
+            if (model := radial_models.get(self.names[lane])) and model.plug
         }
         self._drives = Drives()
+        self._sure_m = robot.radial_sigma_m  # filters are told that distances are as good as this
         first_turn = {lane: mount.corner_turn for lane, mount in self.mounts.items()}
         sides = {lane: -mount.face_turn for lane, mount in self.mounts.items()}
         rng = np.random.default_rng(seed)
@@ -176,8 +178,8 @@ class Pilot:
     def _measure(self, whisk: Whisk) -> None:
         """Tell the distance and what kind of contact it was; after one of the shaft, how the tip gets there.
 
-        Of a whisk: whisker, onset and release (ticks), turn, peak_counts, line_mm (the model's own answer), sigma_mm,
-        distance_mm and type ("tip" or "shaft"; None: unsure), tries (whisks before it at the same object), face (probability
+        Of a whisk: whisker, onset and release (ticks), turn, peak_counts, line_mm (the model's own answer), sigma_mm
+        (of the distance), distance_mm and type ("tip" or "shaft"; None: unsure), tries (whisks before it at the same object), face (probability
         that the tip is on a surface, by the contact filter; nan: not known).
         """
         lane, turn = whisk.lane, whisk.direction
@@ -187,10 +189,9 @@ class Pilot:
         counts = peak(samples[push], contact.rest)
         recorded = Recorded(ticks * TICK_S, samples, np.full(len(ticks), self.behaviour.wheels.whisk_rad_s))
         reported = estimate(model, recorded, counts)
-        face = math.nan
-        if isinstance(model, WhiskModel):
-            face = self.feelers[lane].face
-            distance = mount.whisked(model, model.shape_of(recorded), turn, face)
+        sigma_mm, face = reported.sigma_mm, math.nan
+        if lane in self.feelers:
+            distance, sigma_mm, face = self._felt_distance(lane)
         else:
             distance = mount.distance(reported.radius_mm, turn)
         kind = contact_type(mount, distance)
@@ -202,10 +203,21 @@ class Pilot:
         made |= {
             "peak_counts": counts,
             "line_mm": reported.radius_mm,
-            "sigma_mm": reported.sigma_mm,
+            "sigma_mm": sigma_mm,
             "distance_mm": distance,
         }
         self.whisks.append(made | {"type": kind, "tries": whisk.tries, "face": face})
+
+    def _felt_distance(self, lane: int) -> tuple[float | None, float, float]:
+        """Distance (None: unsure) and its deviation, mm, by the contact filter at the release; probability of a face."""
+        bent, last, release = self.feelers[lane].bent, self.feelers[lane].last, self.contacts[lane].release
+        if bent is None:
+            return None, math.nan, math.nan
+        here = last.after(self._drives.since(last.tick, release), release) if last else NOWHERE
+        nearest = self.radial_models[self.names[lane]].known_mm[0]
+        faces = (bent.face, last.face) if last else (bent.face,)
+        distance = self.mounts[lane].felt(faces, here.point, here.point_sd, nearest, self._sure_m)
+        return distance, 1e3 * (here if last else bent).point_sd, bent.face
 
     def _texture_cells(self, lane: int, tick: int, held_back: bool) -> list[float | None]:
         whisker = self.surfaces[lane]

@@ -5,16 +5,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ..native import as_doubles, doubles, ffi, lib, octets
-from .radial.shape import Contact
-from .radial.whisk import WhiskModel
+from .radial.plug import CREEP, CREEP_S, Plug
+from .radial.push import Contact
 
 # The CrunchBot's whisker; a calibration's kappa and cone replace them.
 LENGTH_M, CONE_M, KAPPA = 0.140, 0.181739, 1.0
 SETTINGS = {
     "cone_m": CONE_M,
     "kappa": KAPPA,
-    "creep": 0.075,
-    "creep_s": 0.5,
+    "creep": CREEP,
+    "creep_s": CREEP_S,
     "noise_rad": 2.0e-4,  # 0.03 degrees of field at 2.75 of field per tilt
     "largest_rad": 0.25,
     "gain_sd": 0.01,
@@ -40,9 +40,10 @@ LEAST_SAMPLES = 100
 MOTIONS = ("body whisk", "drive-by", "sweep")
 
 
-def cone_of(model: WhiskModel, length_m: float) -> float:
-    """The cone of a calibration, m, limited to what the beam's tables hold."""
-    return length_m / float(np.clip(length_m / (1e-3 * model.cone_mm), *TIPS))
+def settings_of(plug: Plug, length_m: float) -> dict[str, float]:
+    """Of a calibrated whisker; its cone is limited to what the beam's tables hold."""
+    cone_m = length_m / float(np.clip(length_m / (1e-3 * plug.cone_mm), *TIPS))
+    return {"kappa": plug.kappa, "cone_m": cone_m, "gain_sd": plug.spread}
 
 
 class Reports(NamedTuple):
@@ -97,9 +98,9 @@ class ContactFilter:
 
     @classmethod
     def calibrated(
-        cls, model: WhiskModel, contact: Contact, **settings: float
+        cls, plug: Plug, contact: Contact, **settings: float
     ) -> "tuple[ContactFilter, np.ndarray, np.ndarray]":
-        """A filter with the plug, cone and gain of a model of whole whisks, and the push of a recorded contact for `run`:
+        """A filter of a calibrated whisker, and the push of a recorded contact for `run`:
         its bases (n, 3) and tilts (n, 2).
 
         The push ends at the greatest deflection. The base turns about the follicle's exit by `whisk_rad_s`, or moves across
@@ -113,18 +114,18 @@ class ContactFilter:
             raise ValueError("no motion of the base; give the column whisk_rad_s or push_mm_s")
         first = samples[: max(10, len(samples) // 20)]
         off = samples - np.nanmedian(first, axis=0)
-        noise = float(np.nanstd(model.along(first)))
-        per_rad = model.counts_per_rad(float(np.nanmedian(turn)) if turn is not None else 1.0)
-        along = model.along(off)
-        across = off[:, :2] @ model.side if samples.shape[1] > 1 else np.zeros(len(off))
+        noise = float(np.nanstd(plug.along(first)))
+        per_rad = plug.counts_per_rad(float(np.nanmedian(turn)) if turn is not None else 1.0)
+        along = plug.along(off)
+        across = off[:, :2] @ plug.side if samples.shape[1] > 1 else np.zeros(len(off))
         end = int(np.nanargmax(along)) + 1
         bases = np.zeros((end, 3))
         if push is not None:
             bases[:, 1] = -1e-3 * np.abs(push[:end])
         else:
             bases[:, 2] = -np.abs(turn[:end])
-        made = {"kappa": model.kappa, "cone_m": cone_of(model, LENGTH_M), "gain_sd": model.spread}
-        made |= {"noise_rad": max(noise, 1e-9) / per_rad, "sample_s": float(t_s[-1] - t_s[0]) / (len(t_s) - 1)}
+        made = settings_of(plug, LENGTH_M) | {"noise_rad": max(noise, 1e-9) / per_rad}
+        made |= {"sample_s": float(t_s[-1] - t_s[0]) / (len(t_s) - 1)}
         return cls(**(made | settings)), bases, np.column_stack([along, across])[:end] / per_rad
 
     def begin(self) -> None:

@@ -7,14 +7,12 @@ that side presses it further; a face ahead is pressed by a turn that brings the 
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from ..scene import Whisker
-from .radial.whisk import WhiskModel
 
-LEAST_CONFIDENCE = 0.5  # a corner whose whisk is less surely one of those calibrated is not reported
-SURE = 0.9  # probability of face or corner; below, the bending by the turn alone decides
+SURE = 0.9  # probability of face or corner
 NEAREST_MM = 60.0  # the line is fitted from 90 mm on; what reads much nearer was no plain contact
 
 
@@ -47,23 +45,15 @@ class Mount:
             return None
         return line_mm
 
-    def whisked(self, model: WhiskModel, shape: Any, turn: float, face: float) -> float | None:
-        """Distance of a contact pressed by this turn, mm, from its whole whisk; None when unsure.
+    def felt(
+        self, faces: Sequence[float], point_m: tuple[float, float], sd_m: float, nearest_mm: float, sure_m: float
+    ) -> float | None:
+        """Distance, mm, of what the contact filter places in the robot's frame at the release; None when unsure.
 
-        `face`: probability that the tip is on a surface, by the contact filter; nan: not known. A tip on a face bends by
-        anything up to what the innermost corner would, to that side; what bends more is caught somewhere, and what bends
-        to the other side is caught or a corner that was not calibrated.
+        `faces`: probabilities that the tip is on a surface, at different times. A tip that a face holds may bend the
+        whisker as an object near its base would: nearer than `nearest_mm` nothing was calibrated.
         """
-        share = model.share_of(shape)
-        if not 0.0 < share <= model.share(model.low_mm):
-            return None
-        if turn != self.corner_turn:
+        if min(faces) >= SURE:
             return self.length_mm
-        if not max(face, 1.0 - face) >= SURE:
-            face = float(share < model.share(model.tip_mm))
-            if face < 0.5 and self.corner_turn == self.face_turn:
-                return None
-        if face > 0.5:
-            return self.length_mm
-        reported = model.estimate(shape)
-        return reported.radius_mm if reported.confidence >= LEAST_CONFIDENCE else None
+        distance = 1e3 * math.dist(self.base_m, point_m)
+        return distance if max(faces) <= 1.0 - SURE and sd_m <= sure_m and distance >= nearest_mm else None

@@ -172,6 +172,22 @@ def test_rows_report_no_direction_of_a_corner_under_the_shaft(models):
     assert pilot.whisks[0]["type"] == "shaft" and pilot.whisks[0]["face"] < 0.1
 
 
+@pytest.mark.parametrize(
+    ("beside_m", "heading", "tip"), [(0.1, 0.0, False), (0.08, 0.0, False), (0.07, 0.15, True), (0.12, 0.0, None)]
+)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_corner_is_reported_where_it_is_or_not_at_all(models, beside_m, heading, tip, side):
+    """0.12 m beside the robot's middle it is met 40 mm from the whisker's base, and bends it as one far out would."""
+    low, high = sorted((1.25 - side * beside_m, 1.25 - side * (beside_m + 0.04)))
+    scene = room((2.5, 2.5), [(1.25, low, 1.29, high)])
+    pilot = Pilot(scene.robot, *load_models(models, scene.robot), SEED)
+    rows, truth = explore(scene, (0.75, 1.25, side * heading), pilot, SEED, 12_000)
+    poses = [[row[key] for key in ("x_m", "y_m", "theta_rad")] for row in truth]
+    found = [(mm, mm - range_along(scene, whisker, poses[n])) for n, whisker, mm in readings(rows, scene)]
+    assert all(abs(off) < 5.0 for _, off in found)
+    assert len(found) == (tip is not None) and all((mm > 130.0) == tip for mm, _ in found)
+
+
 def line_models(models, scene):
     """The texture models, and the paper's lines of the same whisks."""
     texture, radial = load_models(models, scene.robot)

@@ -1,6 +1,7 @@
 """The contact filter in contacts that sim/mechanics bends, vibration and all. Its parts: host/nav/tests/touch/test_contact_filter.c."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,7 @@ from crunchbot import scene
 from crunchbot.pilot.feel import SURE, Feeler
 from crunchbot.touch.contact_filter import ContactFilter
 from crunchbot.touch.radial import model as radial
-from crunchbot.touch.radial.shape import Contact
-from crunchbot.touch.radial.whisk import WhiskModel
+from crunchbot.touch.radial.push import Contact
 from crunchbot_lab.signals.mechanics import Whisker, touch
 
 TICK_S = 5e-4
@@ -125,7 +125,7 @@ def test_arrays_of_other_shapes_are_named():
 
 def test_a_calibration_by_whisks_is_enough_to_follow_a_whisk(tmp_path, capsys):
     rng = np.random.default_rng(3)
-    radial.save(radial.fit(whisks(rng, 5), "whisk").model, tmp_path / "model.json")
+    radial.save(radial.fit(whisks(rng, 5), "rational").model, tmp_path / "model.json")
     pressed = whisk(115.0, rng)
     rows = np.column_stack([pressed.t_s, pressed.samples, pressed.whisk_rad_s])
     head = "contact,t_s,x,y,whisk_rad_s\n"
@@ -144,24 +144,26 @@ def test_a_calibration_by_whisks_is_enough_to_follow_a_whisk(tmp_path, capsys):
 def test_a_calibrated_cone_is_limited_to_the_beams_tables(cone_mm):
     """A fit has wider limits."""
     rng = np.random.default_rng(4)
-    model = WhiskModel(radial.fit(whisks(rng, 5), "whisk").model.content | {"cone_mm": cone_mm})
-    follower, bases, tilts = ContactFilter.calibrated(model, whisk(115.0, rng))
+    plug = replace(radial.fit(whisks(rng, 5), "linear").model.plug, cone_mm=cone_mm)
+    follower, bases, tilts = ContactFilter.calibrated(plug, whisk(115.0, rng))
     assert len(follower.run(bases, tilts).sample) > 20
     whisker = scene.Whisker("front", "object", None, (0.0, 0.0), 0.0, 0.14)
-    Feeler(whisker, 1.0, model, 1.0)
+    Feeler(whisker, 1.0, plug, 1.0)
 
 
 def test_what_cannot_be_followed_is_one_line(tmp_path, capsys):
     rng = np.random.default_rng(3)
-    model = radial.fit(whisks(rng, 5), "whisk").model
+    plug = radial.fit(whisks(rng, 5), "linear").model.plug
     pressed = whisk(115.0, rng)
     with pytest.raises(ValueError, match="no motion of the base; give the column whisk_rad_s or push_mm_s"):
-        ContactFilter.calibrated(model, Contact(pressed.t_s, pressed.samples))
+        ContactFilter.calibrated(plug, Contact(pressed.t_s, pressed.samples))
     with pytest.raises(ValueError, match="50 samples; give at least 100"):
-        ContactFilter.calibrated(model, pressed.until(50))
-    radial.save(radial.fit(whisks(rng, 5), "linear").model, tmp_path / "line.json")
+        ContactFilter.calibrated(plug, pressed.until(50))
+    line = radial.fit(whisks(rng, 5), "linear").model
+    line.plug = None
+    radial.save(line, tmp_path / "line.json")
     (tmp_path / "contacts.csv").write_text("contact,t_s,x\na,0,1\n")
     status, _, said = run(capsys, "radial", "follow", tmp_path / "line.json", tmp_path / "contacts.csv")
     assert status == 2
     assert "line.json" in said
-    assert "no model of whole whisks; fit with '--model whisk'" in said
+    assert "it holds no plug; fit it anew, with the column whisk_rad_s, push_mm_s or depth_mm" in said

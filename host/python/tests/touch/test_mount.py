@@ -1,5 +1,7 @@
 """What a pressed whisker may say, for the demo's four object whiskers."""
 
+import math
+
 import pytest
 
 from crunchbot.touch.mount import NEAREST_MM, Mount
@@ -31,3 +33,25 @@ def test_outer_whisker_is_sure_only_of_its_tip():
     assert mount.distance(100.0, mount.corner_turn) is None
     assert mount.distance(150.0, mount.corner_turn) == pytest.approx(140.0)
     assert mount.distance(mount.length_mm, mount.corner_turn) == mount.length_mm
+
+
+@pytest.mark.parametrize("mount", MOUNTS)
+@pytest.mark.parametrize(
+    ("arc_mm", "sd_m", "faces", "distance"),
+    [
+        (110.0, 0.001, (0.02, 0.0), 110.0),
+        (110.0, 0.001, (0.98, 0.97), 140.0),
+        (110.0, 0.001, (0.02, 0.97), None),  # the kind is not known
+        (110.0, 0.001, (0.5, 0.02), None),
+        (math.nan, math.inf, (0.98,), 140.0),
+        (math.nan, math.inf, (0.02,), None),
+        (110.0, 0.006, (0.02, 0.02), None),  # nor the place
+        (75.0, 0.001, (0.02, 0.02), None),
+    ],
+)
+def test_what_the_filter_places_is_reported_where_it_is_sure(mount, arc_mm, sd_m, faces, distance):
+    """Whichever way it is pressed."""
+    x, y = mount.base_m
+    point = x + 1e-3 * arc_mm * math.cos(mount.yaw_rad), y + 1e-3 * arc_mm * math.sin(mount.yaw_rad)
+    found = mount.felt(faces, point, sd_m, 76.0, 0.005)
+    assert found is None if distance is None else found == pytest.approx(distance)

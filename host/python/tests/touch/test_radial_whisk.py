@@ -12,7 +12,6 @@ from crunchbot.tables import TableError
 from crunchbot.touch.radial import model as radial
 from crunchbot.touch.radial.model import Contact, Whisks
 from crunchbot.touch.radial.shape import shape_of, terms_of
-from crunchbot.touch.radial.whisk import WhiskModel
 
 
 def errors(model, held: Whisks) -> np.ndarray:
@@ -187,9 +186,3 @@ def test_the_command_reports_how_sure_it_is(capsys, tmp_path, calibrated):
     write(tmp_path / "one.csv", one, "contact,radius_mm,t_s,whisk_rad_s,x")
     code, _, err = run(capsys, "radial", "predict", tmp_path / "m.json", tmp_path / "one.csv")
     assert code == 2 and "1 channels, but the model has 2" in err and err.count("\n") == 1
-
-
-def test_whole_whisks_are_chosen_where_they_predict_left_out_places_best():
-    found = radial.fit(whisks(np.random.default_rng(1), 5, 0.02, "rate"))
-    assert isinstance(found.model, WhiskModel)
-    assert found.place_mm < found.tried["press"][0] and found.place_mm < found.tried["linear"][0]

@@ -6,7 +6,8 @@ from numpy.typing import ArrayLike
 
 from ...fields import Fields
 from ...native import as_doubles, doubles, lib
-from .whisk_fit import TIP_MM
+from .plug import Plug
+from .push import LEAST, RADIUS_MOST_MM, TIP_MM
 
 
 def radii_of(fields: Fields, *names: str) -> list[float]:
@@ -17,19 +18,25 @@ def radii_of(fields: Fields, *names: str) -> list[float]:
 
 
 class Known:
-    """What models of known radii share. high_mm: the outermost of them; sigma_mm: error of a prediction."""
+    """What models of known radii share. low_mm, high_mm: the innermost and outermost of them; sigma_mm: error of a prediction."""
 
     node: int | None = None  # whose whisker it is, where known
+    plug: Plug | None = None  # of the whisker, where calibration tells it
+    low_mm: float
     high_mm: float
     sigma_mm: float
+
+    @property
+    def known_mm(self) -> tuple[float, float]:
+        """Radii between which the model is known: the calibrated ones, and SLACK beyond."""
+        slack = SLACK * self.high_mm
+        return self.low_mm - slack, self.high_mm + slack
 
     def contact_type(self, radius_mm: float) -> str:
         """'tip' near the outermost fitted radius (one sigma, at least TIP_MM) or beyond it, else 'shaft'."""
         return "tip" if radius_mm > self.high_mm - max(self.sigma_mm, TIP_MM) else "shaft"
 
 
-RADIUS_MOST_MM = 1e5
-LEAST = 1e-12  # of what must be above 0
 LEAST_BELOW, BELOW_MOST = (
     0.05,
     50.0,
@@ -121,14 +128,9 @@ class CurveModel(Known):
         below = 1.0 + self.d * f
         if not np.isfinite(f) or below <= 0.0:
             return (self.high_mm if np.isfinite(f) else float("nan")), self.high_mm - self.low_mm
-        return float(np.clip((self.c0 + self.c1 * f) / below, *self._known)), self.sigma_mm
+        return float(np.clip((self.c0 + self.c1 * f) / below, *self.known_mm)), self.sigma_mm
 
     def knows(self, radius_mm: float) -> bool:
         """Whether an answer is the curve's own, and not held at the end of where it is known; False for nan."""
-        low, high = self._known
+        low, high = self.known_mm
         return low < radius_mm < high
-
-    @property
-    def _known(self) -> tuple[float, float]:
-        slack = SLACK * self.high_mm
-        return self.low_mm - slack, self.high_mm + slack

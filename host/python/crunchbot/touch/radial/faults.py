@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...tables import TableError, Warn
-from .shape import SAMPLES_LEAST, Contact
+from .push import SAMPLES_LEAST, Contact
 
 RATES_APART = 0.1  # relative: contacts sampled alike
 STUCK_MOST = 0.5  # of a contact's samples: share that one value beside the rest may last

@@ -18,10 +18,11 @@ from ...outputs import put
 from ...tables import TableError, Warn, ignore, numbers, read_columns
 from .curve import CurveModel, Known, peak, peak_of, radii_of
 from .faults import faulty, radii_of_contacts
+from .plug import Plug
 from .press import PressModel
-from .shape import Contact, shape_of
+from .push import TIP_MM, Contact, presses_of
+from .shape import shape_of
 from .whisk import WhiskModel
-from .whisk_fit import TIP_MM
 
 FORMAT = "whisker radial model 1"
 FIELDS = ("a1", "a0", "sigma_mm", "low_mm", "high_mm")
@@ -37,6 +38,7 @@ MOTION_COLUMNS = {
 DIRECTION_COLUMN = "direction_deg"  # of the touch about the shaft
 NODE_MOST = 2**32 - 1
 NODE_COLUMN = "node"  # serial number of the node whose whisker it is
+PLUG = "plug"  # of any model: what the contact filter needs
 NO_CHANNEL = ("contact", "radius_mm", "t_s", NODE_COLUMN, DIRECTION_COLUMN, *MOTION_COLUMNS)
 CANDIDATES = ("linear", "rational", "whisk", "press")
 MODELS = ("paper", *CANDIDATES, "default")
@@ -202,7 +204,8 @@ def fit(whisks: Whisks, name: str = "default") -> Fitted:
     """A model of the contacts by its name (MODELS); ValueError when they do not determine one.
 
     `default` is the model that predicts the contacts at left-out places best; of those whose error there is within a
-    standard error of the best one's, the model that predicts left-out contacts best. The model belongs to the whisks' node.
+    standard error of the best one's, the model that predicts left-out contacts best. The model belongs to the whisks' node, and
+    holds their plug where they tell it.
     """
     model = _model_of(whisks, "linear" if name == "default" else name)
     if len(set(whisks.radius_mm.tolist())) == 1:
@@ -217,6 +220,7 @@ def fit(whisks: Whisks, name: str = "default") -> Fitted:
             continue
     best = _best({one: np.nan_to_num(errors, nan=np.inf) for one, (_, *errors) in found.items()}, len(whisks.contact))
     found[best][0].node = whisks.node
+    found[best][0].plug = Plug.fit(presses_of(whisks.recorded)[0], whisks.radius_mm)
     return Fitted(*found[best], {one: tuple(errors) for one, (_, *errors) in found.items()})
 
 
@@ -259,7 +263,8 @@ def save(model: Any, path: str | Path) -> None:
     """Write a model of any kind as JSON."""
     formats = {RadialModel: FORMAT, WhiskModel: WHISK_FORMAT, CurveModel: CURVE_FORMAT, PressModel: PRESS_FORMAT}
     node = {} if model.node is None else {NODE_COLUMN: model.node}
-    put(path, json.dumps({"format": formats[type(model)]} | node | model.content, indent=1) + "\n")
+    plug = {} if model.plug is None else {PLUG: model.plug.content}
+    put(path, json.dumps({"format": formats[type(model)]} | node | model.content | plug, indent=1) + "\n")
 
 
 def load(path: str | Path) -> RadialModel | CurveModel | WhiskModel | PressModel:
@@ -274,6 +279,7 @@ def load(path: str | Path) -> RadialModel | CurveModel | WhiskModel | PressModel
         fields = Fields(read_json(path))
         model = kinds[fields.text("format", *kinds)](fields)
         model.node = fields.whole(NODE_COLUMN, 0, NODE_MOST) if fields.has(NODE_COLUMN) else None
+        model.plug = Plug.of(fields.part(PLUG)) if fields.has(PLUG) else None
         return model
     except ValueError as error:
         raise not_a_model(path, error) from error

@@ -14,10 +14,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...fields import HUGE, Fields
+from ...fields import Fields
 from ...native import as_doubles
-from .curve import LEAST, RADIUS_MOST_MM, CurveModel, Known, peak_of
-from .shape import Contact
+from .curve import CurveModel, Known, peak_of
+from .push import (
+    AXES_MOST,
+    LEAST,
+    ONSET_SHARE,
+    RADIUS_MOST_MM,
+    UNITS,
+    Contact,
+    Press,
+    advance_of,
+    press_of,
+    presses_of,
+    reach_of,
+)
 
 STAGES = 16  # depths at which there is a regression, denser at the start
 STAGE_POWER = 1.5
@@ -27,102 +39,10 @@ SMOOTH_RIDGES = (0.1, 1.0, 10.0, 1e6)  # of the Gaussians over ln f: from close 
 FREE_RIDGE = 1e-6  # of constant, ln f and its square
 CENTRES = 8
 LEAST_PLACES, LEAST_CONTACTS = 4, 8
-LINE_LEAST = 8  # samples in a line
-ONSET_SHARE = 0.06  # of the shortest push in calibration: lines before and after the onset
-ONSET_CLEAR = 0.4  # of the largest change of slope; later, larger ones may be slips (docs/methods/radial.md)
-MEDIAN = 5  # samples: a running median takes out single bad records
 DEEPEST_SHARE = 0.98  # of the shortest push in calibration: the last depth
 RADIUS_SLACK = 0.15  # radii beyond the calibrated ones that are answered, as a share
 USUAL = 3.5  # standard deviations of a feature that are nothing unusual
-AXES_MOST, DIRECTIONS_MOST = 8, 72
-UNITS = {"depth_mm": "mm", "push_mm_s": "mm", "whisk_rad_s": "rad", "": "s"}
-
-
-class Press(NamedTuple):
-    """The push of a contact: depth (n,) from its onset on, deflection (n, channels) about the rest, unit of depth."""
-
-    depth: np.ndarray
-    deflection: np.ndarray
-    unit: str
-
-
-def advance_of(contact: Contact) -> tuple[np.ndarray, str]:
-    """How far the base has moved (n,), and its unit: by the depth, else by a rate's integral, else the time."""
-    if contact.depth_mm is not None:
-        return np.asarray(contact.depth_mm, np.float64), UNITS["depth_mm"]
-    for name in ("push_mm_s", "whisk_rad_s"):
-        rate = getattr(contact, name)
-        if rate is not None:
-            steps = np.diff(contact.t_s, prepend=contact.t_s[:1]) * np.abs(rate)
-            return np.cumsum(np.nan_to_num(steps)), UNITS[name]
-    return np.asarray(contact.t_s, np.float64) - contact.t_s[0], UNITS[""]
-
-
-def press_of(contact: Contact, window: float) -> Press | None:
-    """The push of a contact, whole or so far; None when the samples show none. `window`: advance on both sides of the
-    onset over which lines are laid to find it."""
-    advance, unit = advance_of(contact)
-    columns = np.column_stack([contact.samples, advance, contact.t_s])
-    good = (np.abs(columns) < HUGE).all(axis=1)  # False for nan
-    t_s, advance, samples = contact.t_s[good], advance[good], _median(contact.samples[good])
-    if len(t_s) < 4 * LINE_LEAST or not t_s[-1] > t_s[0]:
-        return None
-    end = push_end(advance, samples, contact.depth_mm is not None)
-    width = max(LINE_LEAST, _samples_in(window, advance[: end + 1]))
-    onset = _onset(t_s[: end + 1], samples[: end + 1], width)
-    if onset is None:
-        return None
-    before = slice(max(0, onset - width), onset + 1)
-    rest = _line_end(t_s[before], samples[before])
-    after = slice(onset, end + 1)
-    return Press(advance[after] - advance[onset], samples[after] - rest, unit)
-
-
-def _median(samples: np.ndarray) -> np.ndarray:
-    if len(samples) < MEDIAN:
-        return samples
-    padded = np.pad(samples, ((MEDIAN // 2, MEDIAN // 2), (0, 0)), mode="reflect")
-    return np.median(np.lib.stride_tricks.sliding_window_view(padded, MEDIAN, axis=0), axis=-1)
-
-
-def push_end(advance: np.ndarray, samples: np.ndarray, known: bool) -> int:
-    """Index at which the push ends: the greatest depth where it is known, else the greatest deflection."""
-    if known:
-        return int(np.argmax(advance))
-    width = max(1, len(samples) // 100)
-    rest = samples[: max(LINE_LEAST, len(samples) // 20)].mean(axis=0)
-    size = np.linalg.norm(samples - rest, axis=1)
-    return int(np.argmax(np.convolve(size, np.ones(width) / width, "same")))
-
-
-def _samples_in(window: float, advance: np.ndarray) -> int:
-    """Number of samples in which the base advances by `window` while it moves; at most all of them."""
-    steps = np.diff(advance)
-    steps = steps[steps > 0.0]
-    return min(len(advance), int(window * len(steps) / steps.sum())) if len(steps) else 0
-
-
-def _line_end(t_s: np.ndarray, samples: np.ndarray) -> np.ndarray:
-    """Value (channels,) at its last time of a least-squares line: a rest that drifts, as it is at the onset."""
-    off = t_s - t_s.mean()
-    square = float(off @ off)
-    slope = off @ (samples - samples.mean(axis=0)) / square if square > 0.0 else 0.0
-    return samples.mean(axis=0) + slope * off[-1]
-
-
-def _onset(t_s: np.ndarray, samples: np.ndarray, width: int) -> int | None:
-    """Index of the first clear change of slope, between lines over `width` samples before and after it."""
-    count = len(t_s) - width
-    if count <= width:
-        return None
-    x = (t_s - t_s[0])[:, None]
-    y = samples - samples.mean(axis=0)
-    sums = [np.cumsum(np.vstack([np.zeros((1, part.shape[1])), part]), axis=0) for part in (x, x * x, y, x * y)]
-    sx, sxx, sy, sxy = (total[width:] - total[:-width] for total in sums)
-    slopes = (width * sxy - sx * sy) / np.maximum(width * sxx - sx * sx, 1e-300)
-    change = np.linalg.norm(slopes[width:] - slopes[:-width], axis=1)
-    first = int(np.argmax(change >= ONSET_CLEAR * change.max()))
-    return width + first + int(np.argmax(change[first : first + width]))
+DIRECTIONS_MOST = 72
 
 
 def features_of(press: Press, depth: float) -> np.ndarray | None:
@@ -223,16 +143,6 @@ def _ridge(rows: np.ndarray, target: np.ndarray, held: np.ndarray) -> tuple[np.n
     return inverse @ (rows.T @ target), inverse
 
 
-def _reach(contact: Contact) -> float:
-    """Advance of a whole contact up to its end."""
-    advance, _ = advance_of(contact)
-    good = np.isfinite(contact.samples).all(axis=1) & np.isfinite(advance)
-    if np.count_nonzero(good) < 4 * LINE_LEAST:
-        return math.inf
-    advance = advance[good]
-    return float(advance[push_end(advance, contact.samples[good], contact.depth_mm is not None)] - advance[0])
-
-
 class Estimate(NamedTuple):
     """Radius and its standard deviation, mm; confidence 0..1 that the press is like those calibrated; direction of the
     touch, degrees, where the model knows directions."""
@@ -271,8 +181,7 @@ class PressModel(Known):
         """Fits a model to contacts at known radii (n,) mm, and directions (n,) degrees where known; ValueError when too few."""
         radii = np.asarray(radius_mm, np.float64)
         directions = np.full(len(radii), np.nan) if direction_deg is None else np.asarray(direction_deg, np.float64)
-        window = ONSET_SHARE * min((_reach(contact) for contact in contacts), default=0.0)
-        presses = [press_of(contact, window) for contact in contacts]
+        presses, window = presses_of(contacts)
         use = np.array([n for n, press in enumerate(presses) if press is not None and radii[n] > 0.0], int)
         units, places = {presses[n].unit for n in use}, len(np.unique(radii[use]))
         if len(use) < LEAST_CONTACTS or places < LEAST_PLACES or len(units) != 1:
@@ -307,7 +216,7 @@ class PressModel(Known):
 
     def _whole(self, contact: Contact) -> bool:
         """Whether a contact has advanced as far as those calibrated: only then do peaks compare."""
-        return DEEPEST_SHARE * self.window <= ONSET_SHARE * _reach(contact) < math.inf
+        return DEEPEST_SHARE * self.window <= ONSET_SHARE * reach_of(contact) < math.inf
 
     def _grown(self, contact: Contact) -> Estimate:
         """By the stages. Before the first depth: the middle of the radii, and no confidence."""

@@ -1,33 +1,14 @@
 """Recorded whisks as shapes (host/nav/touch/radial/radial_whisk.h), the numbers in which a model sees them."""
 
-from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from ...native import as_doubles, doubles, ffi, lib
+from .push import SAMPLES_LEAST, Contact
 
 TERMS = ("turn", "rate", "reported", "bow", "back")
-SAMPLES_LEAST = 8
 CROP_SHARE = 0.1  # of the peak: what is above belongs to the contact
-
-
-@dataclass
-class Contact:
-    """One recorded contact: times (n,) s, samples (n, axes), and where known, each (n,): rates of turn commanded and
-    reported, rad/s; rate of a push by translation, mm/s; depth of the push, mm, from any zero."""
-
-    t_s: np.ndarray
-    samples: np.ndarray
-    whisk_rad_s: np.ndarray | None = None
-    reported_rad_s: np.ndarray | None = None
-    push_mm_s: np.ndarray | None = None
-    depth_mm: np.ndarray | None = None
-
-    def until(self, end: int) -> "Contact":
-        """The contact's first `end` samples."""
-        columns = (getattr(self, field.name) for field in fields(self))
-        return Contact(*(None if column is None else column[:end] for column in columns))
 
 
 def shape_of(contact: Contact) -> ffi.CData:

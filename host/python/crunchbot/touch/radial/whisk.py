@@ -7,8 +7,9 @@ import numpy as np
 
 from ...fields import Fields
 from ...native import as_doubles, ffi, lib
-from .curve import LEAST, radii_of
-from .shape import TERMS, Contact, shape_of
+from .curve import radii_of
+from .push import LEAST, Contact
+from .shape import TERMS, shape_of
 from .whisk_fit import learn
 
 LEAST_CONTACTS = 5
@@ -18,6 +19,7 @@ LOG_RATE_NONE = 1e-6  # rates were not known in calibration: seconds stand for r
 class WhiskModel:
     """`nav_whisk_model` of one whisker: made by `fit` or from what `content` gave."""
 
+    plug = None
     node: int | None = None  # whose whisker it is, where known
     SCALARS = ("axes", "log_gain", "kappa", "cone_mm", "spread", "low_mm", "high_mm", "tip_mm") + (
         "direction_sd",

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...native import lib
+from .push import TIP_MM
 from .shape import terms_of
 
 # Priors of the weights, mean and standard deviation. The whisker bends as far as it is pushed, so the angle's weight is
@@ -30,7 +31,6 @@ SPREAD_LEAST = 0.002
 ROUNDS = 12
 
 # Radii that are possible beyond the calibrated ones: one calibrated step inwards, outwards as far as the tip.
-TIP_MM = 3.0
 DIRECTION_LEAST_RAD = 0.05
 LOG_MISFIT_LEAST = 0.5
 
