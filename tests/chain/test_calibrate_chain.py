@@ -12,7 +12,8 @@ from chainrun import BUILD, END_S
 from crunchbot import scene as scenes
 from crunchbot.pilot.behaviour import WHISK_RAD_S
 from crunchbot.touch.mount import Mount
-from crunchbot.touch.radial.model import read_whisks, shape_of
+from crunchbot.touch.radial.model import read_whisks
+from crunchbot.touch.radial.push import presses_of
 from crunchbot_lab.signals.recordings import radial_contacts
 from crunchbot_lab.simulation.scenes import make_robot
 
@@ -100,13 +101,13 @@ def test_every_whisk_is_cut_out_and_reported(calibrated):
 def test_the_peak_per_angle_is_that_of_the_signals(calibrated):
     """The same post without bridge, bus and daemon: peaks differ by repeatability, here by no more than three of it."""
     folder, _ = calibrated
-    live = [shape_of(c) for c in read_whisks(folder / "live/object_2.csv", with_radius=True).recorded]
+    live, _ = presses_of(read_whisks(folder / "live/object_2.csv", with_radius=True).recorded)
     flat = scene_with_post().flat((SIDE_M / 2, SIDE_M / 2, 0.0))
     peaks = [
         np.hypot(*(c.counts - c.counts[:300].mean(axis=0)).T).max()
         for c in radial_contacts(flat, "object_2", SEED, 5, PUSH_S, (RADIUS_MM,))
     ]
-    ours = np.mean([s.peak / s.turn for s in live])
+    ours = np.mean([np.linalg.norm(push.deflection[-1]) / push.depth[-1] for push in live])
     assert ours == pytest.approx(np.mean(peaks) / (PUSH_S * WHISK_RAD_S), rel=0.12)
 
 

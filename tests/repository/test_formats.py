@@ -27,7 +27,7 @@ from crunchbot.touch import calibration
 from crunchbot.touch.radial import model as radial_models
 from crunchbot.touch.radial import press
 from crunchbot.touch.radial.curve import CurveModel
-from crunchbot.touch.radial.whisk import WhiskModel
+from crunchbot.touch.radial.plug import Plug
 from crunchbot.touch.texture import model as texture_model
 from crunchbot.touch.texture import spectral
 from crunchbot_lab import scenes
@@ -232,11 +232,12 @@ def test_fields_of_radial_models():
         radial_models.FORMAT: {*radial_models.FIELDS},
         radial_models.CURVE_FORMAT: {*CurveModel.NUMBERS},
         radial_models.PRESS_FORMAT: {"unit", "axes", *press.PressModel.NUMBERS, "stages", "curve"},
-        radial_models.WHISK_FORMAT: {*WhiskModel.SCALARS, *WhiskModel.ARRAYS, "covariance"},
     }
     assert {name: row_of("Radial models", name) for name in column("Radial models")} == fields
     stage = re.search(r"A stage of a press model has.*?\. ", PAGE, re.DOTALL)[0]
     assert names([stage]) == {"direction_deg", *press.Stage.NAMES}
+    plug = re.search(r"A plug has.*?\. ", PAGE, re.DOTALL)[0]
+    assert names([plug]) == {"unit", *Plug.NUMBERS, "direction"}
 
 
 def test_keys_of_a_fault(tmp_path):

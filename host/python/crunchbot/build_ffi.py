@@ -28,10 +28,7 @@ HEADERS = {
         HOST / "nav" / name
         for name in (
             "touch/contact/contact.h",
-            "touch/contact/contact_trace.h",
-            "touch/contact/contact_shape.h",
             "touch/radial/radial.h",
-            "touch/radial/radial_whisk.h",
             "touch/contact/contact_beam.h",
             "touch/contact/contact_state.h",
             "touch/contact/contact_filter.h",

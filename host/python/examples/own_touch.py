@@ -48,7 +48,7 @@ def contacts(path: Path, kind: str = "paper") -> float:
 
 def main(folder: Path = Path("examples")) -> tuple[float, dict[str, float]]:
     """Share of windows right; errors in mm by model."""
-    return textures(folder / "surfaces"), {kind: contacts(folder / "contacts.csv", kind) for kind in ("paper", "whisk")}
+    return textures(folder / "surfaces"), {k: contacts(folder / "contacts.csv", k) for k in ("paper", "default")}
 
 
 if __name__ == "__main__":

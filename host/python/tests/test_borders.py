@@ -26,8 +26,6 @@ from crunchbot.touch.contact import Contact
 from crunchbot.touch.contact_filter import ContactFilter
 from crunchbot.touch.radial.curve import peak
 from crunchbot.touch.radial.model import RadialModel
-from crunchbot.touch.radial.shape import Contact as Whisk
-from crunchbot.touch.radial.shape import shape_of
 from crunchbot.touch.texture.classifier import Classifier, blocks_of, plain_features
 from crunchbot.touch.texture.model import TextureModel
 from crunchbot.touch.texture.novelty import Novelty
@@ -42,7 +40,6 @@ OWN = {
     "nav.filters.problem_of",
     "nav.mapper.OneMap._grid",
     "nav.mapper.OneMap._listed",
-    "touch.radial.shape.terms_of",
     "signals.world.World.run",
     "signals.mechanics._counts",
     "signals.mechanics.touch",
@@ -135,11 +132,6 @@ CASES = {
         {"peak_counts": np.arange(5.0), "radius_mm": 90.0 + np.arange(5.0)},
         {"peak_counts": (0,), "radius_mm": (0,)},
     ),
-    "touch.radial.shape.shape_of": Case(
-        lambda **columns: shape_of(Whisk(**columns)),
-        WHISK,
-        {"t_s": (0,), "samples": (0,), "whisk_rad_s": (0,), "reported_rad_s": (0,)},
-    ),
     "touch.texture.novelty.Novelty.native": of_part(
         novelty(), Novelty.native, turn=(0, 1), mean=(1,), row=(0,), limit=(0,)
     ),
@@ -164,7 +156,6 @@ CASES = {
 }
 CASES["touch.texture.classifier.pointers"] = CASES["touch.texture.classifier.Classifier._make"]
 CASES["touch.texture.classifier._reducer"] = CASES["touch.texture.classifier.plain_features"]
-CASES["touch.radial.shape._column"] = CASES["touch.radial.shape.shape_of"]
 
 
 def sources() -> dict[str, Path]:

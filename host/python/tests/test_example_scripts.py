@@ -35,7 +35,7 @@ def test_own_map_and_own_sensor_find_the_robot(data, capsys):
 def test_own_data_train_both_models_of_touch(data):
     right, errors = example("own_touch").main(data)
     assert right > 0.9
-    assert set(errors) == {"paper", "whisk"} and all(0.0 < mm < 12.0 for mm in errors.values())
+    assert set(errors) == {"paper", "default"} and all(0.0 < mm < 12.0 for mm in errors.values())
 
 
 def test_every_filter_is_measured_and_drawn(data, tmp_path, capsys):

@@ -54,14 +54,14 @@ def test_radial_file(tmp_path):
     path = tmp_path / "radial" / "left_inner.csv"
     contacts = recordings.radial_contacts(flat(), "left_inner", seed=1, repeats=2, radii_mm=[90.0, 138.0])
     recordings.write_radial_contacts(path, contacts)
-    assert path.read_text().startswith("contact,radius_mm,t_s,x,y\n0,90,0.0000,")
+    assert path.read_text().startswith("contact,radius_mm,t_s,whisk_rad_s,x,y\n0,90,0.0000,0,")
     table = np.loadtxt(path, delimiter=",", skiprows=1)
     assert sorted(set(table[:, 0])) == [0, 1, 2, 3]
     for n, contact in enumerate(contacts):
         rows = table[table[:, 0] == n]
         assert np.all(rows[:, 1] == contact.radius_mm)
         assert np.allclose(rows[:, 2], np.arange(len(rows)) * 500e-6)
-        assert np.array_equal(rows[:, 3:], contact.counts)
+        assert np.allclose(rows[:, 3], contact.whisk_rad_s) and np.array_equal(rows[:, 4:], contact.counts)
 
 
 def test_texture_folders(tmp_path):

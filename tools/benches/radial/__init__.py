@@ -1,1 +1,1 @@
-"""Radial distance: the paper's line, curves, whole whisks."""
+"""Radial distance: the paper's line, curves, presses."""

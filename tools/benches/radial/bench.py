@@ -1,9 +1,10 @@
-"""Radial distance: errors, sureness, time and stability of the paper's line, a curve, whole whisks and presses.
+"""Radial distance: errors, sureness, time and stability of the paper's line, a curve and presses.
 
 Whiskers are drawn from a batch (stiffness, creep, friction, gain), calibrated with the paper's 5 whisks at 6 radii, and
 judged on others.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -11,8 +12,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from crunchbot.touch.radial import model as radial
-from crunchbot.touch.radial.shape import shape_of
-from crunchbot.touch.radial.whisk import WhiskModel
 from crunchbot_lab.report.figures import SETTINGS
 from crunchbot_lab.scenes.sweep import sweep
 
@@ -21,7 +20,7 @@ from .trials import PAPER_MM, RADII_MM, SOURCES, SPOILS, SPREADS, Kind, Set, Whi
 
 CACHE = store.kept("radial")
 SEED = 48611  # chosen after the last change to the models; nothing was developed on these whiskers
-METHODS = ("paper", "rational", "whisk", "press", "default")
+METHODS = ("paper", "rational", "press", "default")
 WHISKERS, FIT, HELD = 4, 5, 6  # whiskers of each spread; whisks at each radius
 TIP_WHISKERS = 24  # of each spread: shares near 98 % ask for many whisks
 LIMIT_MM, NEAR_MM = RADII_MM[-1] - 3.0, 3.0  # of tip and shaft; nearer to it nothing is asked
@@ -44,24 +43,13 @@ def reported(model, held: Set) -> list[radial.Estimate]:
     return [radial.estimate(model, c, f) for c, f in zip(held.whisks.recorded, held.whisks.peak_counts, strict=True)]
 
 
-class Oracle:
-    """The default model given the true angle of every push: what is left is the plug's spread and the sensor's
-    noise."""
-
-    def __init__(self, cal: Set):
-        self.model = WhiskModel.fit(self.shapes(cal), cal.whisks.radius_mm, cal.whisks.axes)
-
-    @staticmethod
-    def shapes(held: Set) -> list:
-        out = []
-        for c, angle in zip(held.whisks.recorded, held.angle_rad, strict=True):
-            shape = shape_of(radial.Contact(c.t_s, c.samples))
-            shape.turn, shape.reported = angle, shape.stop_s - shape.onset_s  # the latter: nothing is reported
-            out.append(shape)
-        return out
-
-    def off(self, held: Set) -> np.ndarray:
-        return np.array([self.model.estimate(s).radius_mm for s in self.shapes(held)]) - held.whisks.radius_mm
+def with_truth(held: Set) -> Set:
+    """What an oracle sees: the true rate of every push as the base's report."""
+    contacts = [
+        replace(c, reported_rad_s=np.full(len(c.t_s), rate))
+        for c, rate in zip(held.whisks.recorded, held.true_rad_s, strict=True)
+    ]
+    return held._replace(whisks=replace(held.whisks, recorded=contacts))
 
 
 def errors_of(kind_of, number: int) -> dict:
@@ -79,7 +67,8 @@ def errors_of(kind_of, number: int) -> dict:
                 found[name].append(np.array([t.radius_mm for t in answers]) - held.whisks.radius_mm)
                 if name == "default":
                     inside.append(np.abs(found[name][-1]) / np.array([t.sigma_mm for t in answers]))
-            found["oracle"].append(Oracle(cal).off(held))
+            answers = reported(fitted("default", with_truth(cal)), with_truth(held))
+            found["oracle"].append(np.array([t.radius_mm for t in answers]) - held.whisks.radius_mm)
         scores = {name: rms(np.concatenate(v)) for name, v in found.items()}
         scores |= {
             f"{name} worst whisker": max(map(rms, v)) for name, v in found.items() if name in ("default", "oracle")

@@ -1,7 +1,7 @@
 """Whisks with real mechanics for the radial bench: spread between angle and plug, speeds, sampling, what spoils them.
 
 The spread of a whisk is split evenly: half its variance is in the angle turned, half in gain and creep of the plug. The
-true angle is known to the oracle only. Sources of the angle's part: `duration`, the base turns at the commanded rate
+true rate is known to the oracle only. Sources of the angle's part: `duration`, the base turns at the commanded rate
 but for a longer or shorter time; `rate`, it turns faster or slower than commanded for the same time; `rate, reported`:
 the same, and the base reports its rate with 2 % of error.
 """
@@ -37,10 +37,10 @@ class Kind(NamedTuple):
 
 
 class Set(NamedTuple):
-    """Whisks and what only an oracle knows: the angle each was pushed by."""
+    """Whisks and what only an oracle knows: the rate at which each was pushed."""
 
     whisks: Whisks
-    angle_rad: np.ndarray
+    true_rad_s: np.ndarray
 
 
 def recorded(whisker: Whisker, kind: Kind, repeats: int, rng: np.random.Generator) -> Set:
@@ -75,7 +75,7 @@ def _whisk(whisker: Whisker, radius_mm: float, kind: Kind, rng: np.random.Genera
     counts = done.counts[::step].astype(np.float64)
     t_s = np.arange(len(counts)) * step * TICK_S
     found = np.full(len(t_s), true * (1 + TOLD_ERROR * rng.normal())) if kind.source == "rate, reported" else None
-    return Contact(t_s, counts, np.full(len(t_s), speed), found), pushed
+    return Contact(t_s, counts, np.full(len(t_s), speed), found), true
 
 
 SPOILS = (

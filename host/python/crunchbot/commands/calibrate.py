@@ -26,7 +26,8 @@ from ..touch.calibration import (
     measure_rest,
     write_rest,
 )
-from ..touch.radial.model import Contact, fit, read_whisks, shape_of
+from ..touch.radial.model import Contact, fit, read_whisks
+from ..touch.radial.push import ONSET_SHARE, press_of, reach_of
 
 REST = "rest.toml"
 EXAMPLE = "whisker calibrate --out calibration"
@@ -150,11 +151,12 @@ def _rest_line(rest: Rest, names: list[str]) -> str:
 
 def _progress(radius_mm: float, whisk: Whisk, number: int, wanted: int) -> str:
     """What one contact was, and what to do better."""
-    shape = shape_of(Contact(whisk.t_s, whisk.counts))
+    contact = Contact(whisk.t_s, whisk.counts)
+    press = press_of(contact, ONSET_SHARE * reach_of(contact))
     begun = f"  {number} of {wanted}, {radius_mm:g} mm: "
-    if not np.isfinite(shape.back):
+    if press is None or not press.seconds > 0.0:
         return begun + "no whole whisk; push at a steady rate and back again, without pressing twice"
-    return begun + f"pushed for {shape.stop_s - shape.onset_s:.2f} s, peak {shape.peak:.0f} counts"
+    return begun + f"pushed for {press.seconds:.2f} s, peak {np.linalg.norm(press.deflection[-1]):.0f} counts"
 
 
 def _verdict(path: Path) -> str:

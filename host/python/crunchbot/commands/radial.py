@@ -14,9 +14,8 @@ from ..touch.radial import model as radial
 EXAMPLE = "whisker radial fit examples/contacts.csv --out contacts.json"
 COLUMNS = "whisk_rad_s and base_rad_s, or push_mm_s, or depth_mm; direction_deg of the touch"
 DOUBTED_LEAST = 3  # fewer contacts say nothing of the whisker
-KINDS = """paper or linear: equation 3, a line through the peaks; rational: a curve instead; whisk: whole body whisks by
-the physics of the shaft, which the pilot needs to tell a face from a corner; press: a regression at depths of a push, which
-answers during it, and the curve where it doubts; default: the one that predicts left-out places best"""
+KINDS = """paper or linear: equation 3, a line through the peaks; rational: a curve instead; press: a regression at depths of
+a push, which answers during it, and the curve where it doubts; default: the one that predicts left-out places best"""
 
 
 def add(parser: argparse.ArgumentParser) -> None:

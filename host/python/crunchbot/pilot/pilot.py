@@ -65,7 +65,7 @@ class Pilot:
             if (model := radial_models.get(self.names[lane])) and model.plug
         }
         self._drives = Drives()
-        self._sure_m = robot.radial_sigma_m  # filters are told that distances are as good as this
+        self._sure_m = robot.radial_sigma_m  # filters take distances to be as good as this
         first_turn = {lane: mount.corner_turn for lane, mount in self.mounts.items()}
         sides = {lane: -mount.face_turn for lane, mount in self.mounts.items()}
         rng = np.random.default_rng(seed)

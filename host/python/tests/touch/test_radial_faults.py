@@ -50,7 +50,9 @@ WARNED = {
 def test_a_fault_is_reported_in_a_line_and_the_rest_is_fitted(capsys, tmp_path, good, how):
     spoil, reported = WARNED[how]
     write(tmp_path / "c.csv", spoil(good))
-    code, out, err = run(capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json", "--model", "whisk")
+    code, out, err = run(
+        capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json", "--model", "rational"
+    )
     assert code == 0 and err.count("\n") == 1 and str(tmp_path / "c.csv") in err and reported in err
     left_out = how in ("stuck", "stuck from the middle", "three samples")
     assert f"{17 if left_out else 18} contacts" in out
@@ -84,7 +86,7 @@ def test_good_recordings_are_read_without_a_word(capsys, tmp_path, good):
 @pytest.mark.filterwarnings("error")
 def test_another_whisker_is_doubted_in_a_line_and_every_contact_still_reported(capsys, tmp_path, good):
     write(tmp_path / "c.csv", good)
-    run(capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json", "--model", "whisk")
+    run(capsys, "radial", "fit", tmp_path / "c.csv", "--out", tmp_path / "m.json", "--model", "press")
     swapped = [[*row[:4], row[5], row[4]] for row in good]
     write(tmp_path / "s.csv", swapped)
     code, out, err = run(capsys, "radial", "predict", tmp_path / "m.json", tmp_path / "s.csv", "--json")

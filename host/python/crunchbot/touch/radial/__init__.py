@@ -1,1 +1,1 @@
-"""How far along a whisker a contact is: `model` (the paper's line, model files, estimates), `curve`, and `whisk` of whole whisks."""
+"""How far along a whisker a contact is: `model` (the paper's line, model files, estimates), `curve`, `press`, and the `plug`."""

@@ -4,7 +4,7 @@ the places left out; calibration recordings and model files."""
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,13 +21,12 @@ from .faults import faulty, radii_of_contacts
 from .plug import Plug
 from .press import PressModel
 from .push import TIP_MM, Contact, presses_of
-from .shape import shape_of
-from .whisk import WhiskModel
 
 FORMAT = "whisker radial model 1"
 FIELDS = ("a1", "a0", "sigma_mm", "low_mm", "high_mm")
-WHISK_FORMAT, CURVE_FORMAT = "whisker radial whisk model 1", "whisker radial curve model 2"
+CURVE_FORMAT = "whisker radial curve model 2"
 PRESS_FORMAT = "whisker radial press model 2"
+GONE = "whisker radial whisk model 1"  # of whole whisks, which nothing answers by any more
 # How the base moves: turn commanded, turn as the base reports it, translation, depth. As the members of Contact.
 MOTION_COLUMNS = {
     "whisk_rad_s": "whisk_rad_s",
@@ -40,7 +39,7 @@ NODE_MOST = 2**32 - 1
 NODE_COLUMN = "node"  # serial number of the node whose whisker it is
 PLUG = "plug"  # of any model: what the contact filter needs
 NO_CHANNEL = ("contact", "radius_mm", "t_s", NODE_COLUMN, DIRECTION_COLUMN, *MOTION_COLUMNS)
-CANDIDATES = ("linear", "rational", "whisk", "press")
+CANDIDATES = ("linear", "rational", "press")
 MODELS = ("paper", *CANDIDATES, "default")
 
 
@@ -119,26 +118,13 @@ class Whisks:
     bad_rows: int  # rows with a cell that is no finite number: left out
     node: int | None = None  # serial number of the node whose whisker it is, where the file states it
     direction_deg: np.ndarray | None = None  # of the touch about the shaft, where the file states it
-    known_shapes: dict[str, Any] = field(default_factory=dict, repr=False)  # by contact; parts share them
 
     def part(self, use: ArrayLike) -> Whisks:
         """Only the contacts of these indices."""
         arrays = (None if a is None else a[use] for a in (self.peak_counts, self.radius_mm))
         directions = None if self.direction_deg is None else self.direction_deg[use]
         named = [self.contact[n] for n in use], [self.recorded[n] for n in use]
-        return Whisks(*named, *arrays, self.bad_rows, self.node, directions, self.known_shapes)
-
-    @property
-    def shapes(self) -> list:
-        """struct nav_shape of each contact; a fit with contacts left out asks for the same ones again and again."""
-        for name, contact in zip(self.contact, self.recorded, strict=True):
-            if name not in self.known_shapes:
-                self.known_shapes[name] = shape_of(contact)
-        return [self.known_shapes[name] for name in self.contact]
-
-    @property
-    def axes(self) -> int:
-        return self.recorded[0].samples.shape[1] if self.recorded else 0
+        return Whisks(*named, *arrays, self.bad_rows, self.node, directions)
 
 
 def read_whisks(path: str | Path, with_radius: bool, warn: Warn = ignore) -> Whisks:
@@ -194,7 +180,7 @@ class Fitted(NamedTuple):
     """A model with its RMS errors, mm, of contacts predicted by a model fitted without them: without their whole place, and
     without that contact alone; nan where too few remain. tried: the same two errors of every model that was tried."""
 
-    model: RadialModel | CurveModel | WhiskModel | PressModel
+    model: RadialModel | CurveModel | PressModel
     place_mm: float
     contact_mm: float
     tried: dict[str, tuple[float, float]]
@@ -235,9 +221,7 @@ def _model_of(whisks: Whisks, name: str):
         return RadialModel.fit(whisks.peak_counts, whisks.radius_mm)
     if name == "rational":
         return CurveModel.fit(whisks.peak_counts, whisks.radius_mm)
-    if name == "press":
-        return PressModel.fit(whisks.recorded, whisks.radius_mm, whisks.direction_deg)
-    return WhiskModel.fit(whisks.shapes, whisks.radius_mm, whisks.axes)
+    return PressModel.fit(whisks.recorded, whisks.radius_mm, whisks.direction_deg)
 
 
 def _left_out_errors(whisks: Whisks, name: str, model) -> tuple[float, float]:
@@ -261,22 +245,23 @@ def _left_out(whisks: Whisks, name: str, groups) -> float:
 
 def save(model: Any, path: str | Path) -> None:
     """Write a model of any kind as JSON."""
-    formats = {RadialModel: FORMAT, WhiskModel: WHISK_FORMAT, CurveModel: CURVE_FORMAT, PressModel: PRESS_FORMAT}
+    formats = {RadialModel: FORMAT, CurveModel: CURVE_FORMAT, PressModel: PRESS_FORMAT}
     node = {} if model.node is None else {NODE_COLUMN: model.node}
     plug = {} if model.plug is None else {PLUG: model.plug.content}
     put(path, json.dumps({"format": formats[type(model)]} | node | model.content | plug, indent=1) + "\n")
 
 
-def load(path: str | Path) -> RadialModel | CurveModel | WhiskModel | PressModel:
+def load(path: str | Path) -> RadialModel | CurveModel | PressModel:
     """Read what `save` wrote; TableError with one line when it is something else."""
     kinds = {
         FORMAT: RadialModel.of,
-        WHISK_FORMAT: WhiskModel.of,
         CURVE_FORMAT: CurveModel.of,
         PRESS_FORMAT: PressModel.of,
     }
     try:
         fields = Fields(read_json(path))
+        if fields.content.get("format") == GONE:
+            raise ValueError(f"field 'format' is '{GONE}', of an earlier version")
         model = kinds[fields.text("format", *kinds)](fields)
         model.node = fields.whole(NODE_COLUMN, 0, NODE_MOST) if fields.has(NODE_COLUMN) else None
         model.plug = Plug.of(fields.part(PLUG)) if fields.has(PLUG) else None
@@ -291,13 +276,8 @@ def not_a_model(path: str | Path, error: ValueError) -> TableError:
 
 def estimate(model: Any, contact: Contact, peak_counts: float | None = None) -> Estimate:
     """What a model of any kind says of one contact; `peak_counts`: equation 2, where it is known already."""
-    if isinstance(model, WhiskModel | PressModel) and contact.samples.shape[1] != model.axes:
+    if isinstance(model, PressModel) and contact.samples.shape[1] != model.axes:
         raise ValueError(f"{contact.samples.shape[1]} channels, but the model has {model.axes}")
-    if isinstance(model, WhiskModel):
-        reported = model.estimate(model.shape_of(contact))
-        return Estimate(
-            reported.radius_mm, reported.sigma_mm, "tip" if reported.tip > 0.5 else "shaft", reported.confidence
-        )
     if isinstance(model, PressModel):
         found = model.predict(contact)
         return Estimate(found.radius_mm, found.sigma_mm, model.contact_type(found.radius_mm), *found[2:])

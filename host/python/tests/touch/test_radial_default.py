@@ -1,4 +1,4 @@
-"""Radial distance from whole whisks: what is taken out, how sure it is, what spoils it; curves; model files."""
+"""Radial distance by the default model: what is taken out, how sure it is, what spoils it; curves, plugs, model files."""
 
 import json
 import math
@@ -6,12 +6,13 @@ import math
 import numpy as np
 import pytest
 from commandkit import run
-from whisks import TIP_MM, whisk, whisks
+from whisks import CONE_MM, COUNTS, TIP_MM, whisks
 
 from crunchbot.tables import TableError
 from crunchbot.touch.radial import model as radial
 from crunchbot.touch.radial.model import Contact, Whisks
-from crunchbot.touch.radial.shape import shape_of, terms_of
+from crunchbot.touch.radial.plug import Plug
+from crunchbot.touch.radial.push import presses_of
 
 
 def errors(model, held: Whisks) -> np.ndarray:
@@ -27,36 +28,16 @@ def rms(values) -> float:
 def calibrated():
     """A default model of whisks with 4 % of spread, and its calibration."""
     made = whisks(np.random.default_rng(1), 5)
-    return radial.fit(made, "whisk").model, made
+    return radial.fit(made).model, made
 
 
-@pytest.mark.parametrize("split", ["time", "rate"])
-def test_the_angle_turned_is_taken_out(split):
+def test_the_angle_turned_is_taken_out():
+    """Where the base turns for a longer or shorter time, and where it turns faster or slower and says so."""
     rng = np.random.default_rng(2)
-    cal, held = (whisks(rng, n, 0.08, split) for n in (5, 25))
-    paper, whole = (rms(errors(radial.fit(cal, name).model, held)) for name in ("paper", "whisk"))
-    gain_alone = 68.9 * 0.08 / math.sqrt(2)  # the bound of an oracle that knows the angle (whisker_physics section 4)
-    assert paper > 1.2 * gain_alone
-    assert whole < 1.1 * gain_alone
-
-
-def test_speed_may_vary_by_three(calibrated):
-    rng = np.random.default_rng(3)
-    for speed in (0.6, 1.8):
-        held = whisks(rng, 8, 0.02, speed=speed)
-        assert rms(errors(calibrated[0], held)) < 2.5
-
-
-def test_what_lies_long_before_a_whisk_changes_nothing():
-    made = whisk(110.0, np.random.default_rng(7))
-    quiet = np.round(32768 + np.random.default_rng(8).normal(0, 11, (6000, 2)))
-    drifted = quiet.copy()
-    drifted[1000:2000] += 0.05 * np.abs(made.samples - 32768).max()
-    found = []
-    for lead in (quiet, drifted):
-        samples = np.concatenate([lead, made.samples])
-        found.append(shape_of(Contact(np.arange(len(samples)) / 2000.0, samples, np.full(len(samples), math.pi / 24))))
-    assert found[0].peak == found[1].peak and np.array_equal(*map(terms_of, found), equal_nan=True)
+    for split in ("time", "rate"):
+        cal, held = (whisks(rng, n, 0.08, split) for n in (5, 25))
+        paper, best = (rms(errors(radial.fit(cal, name).model, held)) for name in ("paper", "default"))
+        assert best < 0.85 * paper
 
 
 def test_it_is_as_sure_as_it_is_right(calibrated):
@@ -74,11 +55,11 @@ def test_tip_and_shaft(calibrated):
     assert np.mean(said == (held.radius_mm == TIP_MM)) > 0.93
 
 
-@pytest.mark.parametrize(("hz", "channels"), [(2000.0, 1), (100.0, 2), (35.0, 2), (100.0, 3)])
+@pytest.mark.parametrize(("hz", "channels"), [(2000.0, 1), (35.0, 2)])
 def test_any_rate_and_number_of_channels(hz, channels):
     rng = np.random.default_rng(6)
     cal, held = (whisks(rng, n, hz=hz, channels=channels) for n in (5, 10))
-    assert rms(errors(radial.fit(cal, "whisk").model, held)) < 2.6
+    assert rms(errors(radial.fit(cal).model, held)) < 2.6
 
 
 @pytest.mark.parametrize("kappa", [0.3, 3.0])
@@ -114,7 +95,7 @@ def spoil(contact: Contact, how: str, rng) -> Contact:
     return Contact(contact.t_s, samples, contact.whisk_rad_s)
 
 
-@pytest.mark.parametrize("how", ["saturated", "stuck", "dead", "all nan", "flipped", "swapped axes"])
+@pytest.mark.parametrize("how", ["saturated", "dead", "all nan", "flipped", "swapped axes"])
 def test_confidence_falls_when_a_whisker_is_broken(calibrated, how):
     rng = np.random.default_rng(8)
     reported = [radial.estimate(calibrated[0], spoil(c, how, rng)) for c in calibrated[1].recorded]
@@ -122,18 +103,12 @@ def test_confidence_falls_when_a_whisker_is_broken(calibrated, how):
     assert np.median([t.confidence for t in reported]) < 0.5
 
 
-@pytest.mark.parametrize("how", ["nan", "bad records", "drift"])
+@pytest.mark.parametrize("how", ["nan", "bad records", "drift", "stuck"])
 def test_what_can_be_mended_is_mended(calibrated, how):
     rng = np.random.default_rng(9)
     found = whisks(rng, 10)
     found.recorded = [spoil(c, how, rng) for c in found.recorded]
     assert rms(errors(calibrated[0], found)) < 3.0
-
-
-def test_what_are_no_whole_whisks_gets_a_curve():
-    short = whisks(np.random.default_rng(10), 5, 0.001)
-    short.recorded = [Contact(c.t_s[::400], c.samples[::400]) for c in short.recorded]
-    assert radial.fit(short).model.high_mm == TIP_MM  # a line or curve, not whole whisks: these reach beyond
 
 
 @pytest.mark.parametrize("name", radial.MODELS)
@@ -146,24 +121,41 @@ def test_saved_models_load_alike(tmp_path, calibrated, name):
 
 
 @pytest.mark.parametrize(
-    "change",
-    [{"spread": "x"}, {"weight": [1.0]}, {"kappa": -1.0}, {"axes": 99}, {"cone_mm": 1.0}, {"mean": [math.nan] * 5}],
+    "change", [{"spread": "x"}, {"kappa": -1.0}, {"direction": []}, {"unit": "m"}, {"counts_per": math.inf}]
 )
-def test_spoiled_model_files_are_one_clear_line(tmp_path, calibrated, change):
+def test_a_spoiled_plug_is_one_clear_line(tmp_path, calibrated, change):
     radial.save(calibrated[0], tmp_path / "m.json")
-    content = json.loads((tmp_path / "m.json").read_text()) | change
+    content = json.loads((tmp_path / "m.json").read_text())
+    content["plug"] |= change
     (tmp_path / "m.json").write_text(json.dumps(content))
-    with pytest.raises(TableError, match="whisker radial fit"):
+    with pytest.raises(TableError, match="field 'plug.*; make one with 'whisker radial fit'"):
         radial.load(tmp_path / "m.json")
 
 
-def test_a_rate_may_be_known_in_calibration_only_or_later_only(calibrated):
-    held = whisks(np.random.default_rng(12), 8)
-    silent = [Contact(c.t_s, c.samples) for c in held.recorded]
-    without = radial.fit(Whisks(held.contact, silent, held.peak_counts, held.radius_mm, 0), "whisk").model
-    for model, contacts in ((calibrated[0], silent), (without, held.recorded)):
-        held.recorded = contacts
-        assert rms(errors(model, held)) < 3.0
+def test_a_model_of_whole_whisks_is_told_what_it_is_and_what_to_do(tmp_path):
+    (tmp_path / "m.json").write_text('{"format": "whisker radial whisk model 1", "axes": 2}')
+    with pytest.raises(TableError, match="whisk model 1', of an earlier version; make one with 'whisker radial fit'$"):
+        radial.load(tmp_path / "m.json")
+
+
+@pytest.mark.parametrize("kappa", [0.5, 1.0, 2.0])
+def test_the_plug_is_learnt_from_pushes(kappa):
+    """Plug and counts trade; what the filter uses of them is the tilt per angle at each radius."""
+    made = whisks(np.random.default_rng(4), 5, 0.01, kappa=kappa)
+    plug = Plug.fit(presses_of(made.recorded)[0], made.radius_mm)
+    x, learnt = made.radius_mm / CONE_MM, made.radius_mm / plug.cone_mm
+    tilts = plug.counts_per_rad(1.0) * (1 - learnt) / (1 - learnt + plug.kappa * learnt)
+    assert tilts == pytest.approx(COUNTS * (1 - x) / (1 - x + kappa * x), rel=0.1)  # creep, which these lack, is 0.03
+    assert plug.direction == pytest.approx([0.8, -0.6], abs=0.01)
+
+
+def test_a_plug_needs_contacts_at_three_places_that_tell_how_the_base_moved_alike():
+    made = whisks(np.random.default_rng(4), 3)
+    presses, _ = presses_of(made.recorded)
+    assert Plug.fit(presses[:6], made.radius_mm[:6]) is None
+    assert Plug.fit([None] * len(presses), made.radius_mm) is None
+    made.recorded[0] = Contact(made.recorded[0].t_s, made.recorded[0].samples)
+    assert Plug.fit(presses_of(made.recorded)[0], made.radius_mm) is None
 
 
 def write(path, made: Whisks, columns="contact,radius_mm,t_s,whisk_rad_s,x,y"):
