@@ -67,7 +67,7 @@ class Felt:
 
 class Feeler:
     """Follows the contacts of one whisker. Of the present or the last one: `felt`, None where nothing is known now; `last`, the
-    last that was known; `bent`, what was known when the whisker was bent most."""
+    last that was known; `bent`, what was known when the whisker was bent most, and by how much, `most`, rad."""
 
     def __init__(self, whisker: Whisker, calibrated_turn: float, plug: Plug, whisk_rad_s: float):
         """`calibrated_turn`: sign of the turn that pressed it in calibration; `whisk_rad_s`: of calibration."""
@@ -83,7 +83,7 @@ class Feeler:
         self.felt: Felt | None = None
         self.last: Felt | None = None
         self.bent: Felt | None = None
-        self._most = 0.0
+        self.most = 0.0
         self._doubted = False  # what was known did not last while it was bent by more than creep leaves
 
     @property
@@ -110,7 +110,7 @@ class Feeler:
             return
         if new:
             self._onset, self.felt, self.last, self.bent = contact.onset, None, None, None
-            self._most, self._doubted = 0.0, False
+            self.most, self._doubted = 0.0, False
         if self._rest is None or (new and not same):
             self._filter.begin()
             self._rest = _rest(list(self._recent)[:REST_BLOCKS], contact.rest)
@@ -125,9 +125,9 @@ class Feeler:
             return
         self.felt = self._placed(reported, ticks) if reported.other[-1] < 0.5 else None
         bent = abs(float(np.median(tilts[:, 0])))
-        if bent >= self._most:
-            self._most, self.bent = bent, self.felt
-        self._doubted |= self.last is not None and self.felt is None and bent > CREEP * self._most
+        if bent >= self.most:
+            self.most, self.bent = bent, self.felt
+        self._doubted |= self.last is not None and self.felt is None and bent > CREEP * self.most
         self.last = None if self._doubted else self.felt or self.last
 
     def _bases(self, drives: np.ndarray) -> np.ndarray:

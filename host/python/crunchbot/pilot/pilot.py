@@ -211,10 +211,12 @@ class Pilot:
     def _felt_distance(self, lane: int) -> tuple[float | None, float, float]:
         """Distance (None: unsure) and its deviation, mm, by the contact filter at the release; probability of a face."""
         bent, last, release = self.feelers[lane].bent, self.feelers[lane].last, self.contacts[lane].release
-        if bent is None:
-            return None, math.nan, math.nan
+        model, wheels = self.radial_models[self.names[lane]], self.behaviour.wheels
+        nearest = model.known_mm[0]
+        pushed = wheels.push_ticks * TICK_S * wheels.whisk_rad_s
+        if bent is None or self.feelers[lane].most > pushed * model.plug.most(nearest):
+            return None, math.nan, math.nan  # bent more than any corner would that was calibrated: caught
         here = last.after(self._drives.since(last.tick, release), release) if last else NOWHERE
-        nearest = self.radial_models[self.names[lane]].known_mm[0]
         faces = (bent.face, last.face) if last else (bent.face,)
         distance = self.mounts[lane].felt(faces, here.point, here.point_sd, nearest, self._sure_m)
         return distance, 1e3 * (here if last else bent).point_sd, bent.face

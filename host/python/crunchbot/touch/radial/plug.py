@@ -58,6 +58,11 @@ class Plug:
         """Counts per radian by which the plug tilts; `whisk_rad_s`: of calibration, where its file did not state it."""
         return self.counts_per / (whisk_rad_s if self.unit == UNITS[""] else 1.0)
 
+    def most(self, radius_mm: float) -> float:
+        """Tilt of the plug per angle pushed at this radius, at most: with creep, and three deviations from contact to contact."""
+        share = float(np.exp(_log_height(np.array([radius_mm]), math.log(self.kappa), self.cone_mm))[0])
+        return share * (1.0 + CREEP + 3.0 * self.spread)
+
     def along(self, deflection: np.ndarray) -> np.ndarray:
         """Deflections (n, channels), counts, as a signed length (n,) along the direction of calibration."""
         return np.asarray(deflection) @ self.direction
