@@ -2,12 +2,15 @@
 
 import contextlib
 import io
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 
 from .errors import UserError
 
 INTERRUPTED = 130  # the shell's exit code for Ctrl-C
+AGAIN_S = 0.05  # a destructor is over by then; if not, the interrupt comes once more
 
 
 class OutputError(UserError):
@@ -40,7 +43,7 @@ class _Output(io.FileIO):
 def exit_code(program: str, work: Callable[[], int]) -> int:
     """Do the work of a program and give its exit code."""
     try:
-        with _checked_output():
+        with _checked_output(), _kept_interrupts():
             return _code_of(work)
     except BrokenPipeError:  # the reader of our output has gone: not our trouble
         return 0
@@ -62,6 +65,26 @@ def _code_of(work: Callable[[], int]) -> int:
         code = leaving.code or 0
     sys.stdout.flush()
     return code
+
+
+@contextlib.contextmanager
+def _kept_interrupts() -> Iterator[None]:
+    """Python drops an exception that is raised in a destructor. An interrupt that came there comes again, behind it."""
+    before = sys.unraisablehook
+
+    def hook(dropped) -> None:
+        if not issubclass(dropped.exc_type, KeyboardInterrupt):
+            before(dropped)
+            return
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        main = threading.main_thread().ident
+        threading.Timer(AGAIN_S, signal.pthread_kill, (main, signal.SIGINT)).start()
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 def _innermost(error: Exception) -> Exception:

@@ -163,3 +163,26 @@ def test_work_that_is_interrupted_ends_at_once_and_says_so_by_its_exit_code(fold
 def test_what_goes_on_until_it_is_stopped_ends_well(folder, name):
     code, said = ended(serving(folder)[name])
     assert (code, "Traceback" in said) == (0, False), said
+
+
+# What is deleted here gets the signal while it is, where Python drops what the handler raises.
+DROPPED = """
+import signal, sys, threading
+from crunchbot.ends import exit_code
+
+class Deleted:
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+def work():
+    Deleted()
+    threading.Event().wait(float(sys.argv[1]))
+    return 0
+
+sys.exit(exit_code("test", work))
+"""
+
+
+def test_an_interrupt_of_a_destructor_is_obeyed():
+    done = subprocess.run([sys.executable, "-c", DROPPED, str(PATIENCE_S)], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
