@@ -130,7 +130,7 @@ def test_an_older_image_and_one_of_another_build_are_refused_unless_forced(image
 def test_what_is_no_image_is_refused_before_the_bridge_is_touched(image, tmp_path):
     bad = tmp_path / "bad.whex"
     bad.write_bytes(image.read_bytes()[:-1] + b"\x00")
-    for arguments, code in (([bad], 1), ([tmp_path / "none"], 1), ([], 2), (["--list", image], 2)):
+    for arguments, code in (([bad], 2), ([tmp_path / "none"], 2), ([], 2), (["--list", image], 2)):
         done = subprocess.run([program("whisker-flash"), *arguments], capture_output=True, text=True)
         assert (done.returncode, done.stderr.count("\n")) == (code, 1), done.stderr
 
