@@ -206,7 +206,7 @@ def test_a_calibration_that_is_none_is_one_line(capsys, tmp_path, text):
     path = tmp_path / "rest.toml"
     path.write_text(text)
     code, _, err = run(capsys, "doctor", "--rest", path)
-    assert code == 1 and err.count("\n") == 1 and str(path) in err and "that whisker calibrate wrote" in err
+    assert code == 2 and err.count("\n") == 1 and str(path) in err and "that whisker calibrate wrote" in err
 
 
 def test_doctor_asks_for_permission_and_rule(host, monkeypatch):
