@@ -125,6 +125,20 @@ static void frames_of_an_earlier_request_are_no_answer(void **state)
     assert_int_equal(robot.phase, BASE_RESTING);
 }
 
+/* So it is told, however often the request is repeated. */
+static void a_base_that_goes_on_with_an_earlier_request_is_told(void **state)
+{
+    (void)state;
+    const uint8_t frame[] = {CREATE_OI_STREAM_HEADER, (uint8_t)(robot.stream.length - CREATE_OI_STREAM_OVERHEAD)};
+    for (int64_t now_ms = OPENED_MS; now_ms < OPENED_MS + 3 * BASE_SILENCE_MS; now_ms += FRAME_MS) {
+        assert_int_equal(send(line, frame, sizeof frame, 0), sizeof frame);
+        base_robot_read(&robot, UINT64_MAX, now_ms);
+        base_robot_watch(&robot, now_ms);
+        assert_kept(now_ms);
+    }
+    assert_int_equal(log_lines, 1);
+}
+
 /* Of a base that charges a line comes each second: it is reported when it has come, and once. */
 static void what_tells_more_than_nothing_is_told_once(void **state)
 {
@@ -509,6 +523,7 @@ int main(void)
         HEARD(a_base_that_was_not_heard_for_a_while_may_have_been_carried),
         HEARD(frames_of_an_earlier_request_are_no_answer),
         UNHEARD(what_tells_more_than_nothing_is_told_once),
+        UNHEARD(a_base_that_goes_on_with_an_earlier_request_is_told),
         HEARD(a_base_that_is_not_heard_for_half_a_second_stands),
         HEARD(what_has_waited_to_be_read_is_old),
         HEARD(a_mode_that_is_said_again_and_again_is_entered),

@@ -91,7 +91,7 @@ struct base_robot {
     unsigned unheard_requests; /* since the newest frame */
     bool request_due;          /* another is to be written */
     unsigned recalls;          /* since a frame came */
-    bool repeated;             /* a stop was written behind the longest command since the newest request */
+    bool repeated;             /* a stop was written behind the longest command since a frame or a silence */
     bool recalled;             /* by the newest: the line goes at another speed */
     bool answered;             /* a frame has come that the newest request asked for */
     enum create_oi_mode wanted;

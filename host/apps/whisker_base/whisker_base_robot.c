@@ -79,7 +79,7 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
     create_port_forget(robot->port); /* what was said before is not believed */
     robot->error = 0;
     robot->sent = 0;
-    robot->silent = robot->recalled = false;
+    robot->silent = robot->recalled = robot->repeated = false;
     robot->recalls = 0;
     robot->unseen = robot->frame_ms > 0;
     robot->low_brc = -1;
@@ -217,6 +217,7 @@ static void whisker_base_robot_take_frame(struct base_robot *robot, int64_t now_
     robot->silent = now_ms - said_ms >= BASE_SILENCE_MS;
     if (robot->answered) {
         robot->recalls = 0;
+        robot->repeated = false;
         robot->unframed = (struct base_unframed){0};
         whisker_base_robot_log_back(robot);
     }
@@ -389,6 +390,7 @@ static void whisker_base_robot_restart_stream(struct base_robot *robot, int64_t 
     robot->silent = true;
     robot->phase_frames = 0;
     const struct base_unframed unframed = robot->unframed;
+    robot->repeated = false;
     base_request(robot, now_ms);
     whisker_base_robot_log_silence(robot, &unframed, now_ms);
 }

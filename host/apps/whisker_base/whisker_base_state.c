@@ -158,7 +158,6 @@ void base_request(struct base_robot *robot, int64_t now_ms)
     const size_t count = whisker_base_state_order_packets(robot, ids);
     whisker_base_state_expect(robot, ids, count);
     robot->opened_ms = now_ms;
-    robot->repeated = false;
     robot->phase = BASE_RESTING;
     robot->mode_offset = 0;
     robot->firm = robot->may_turn = true;
