@@ -125,8 +125,8 @@ static void frames_of_an_earlier_request_are_no_answer(void **state)
     assert_int_equal(robot.phase, BASE_RESTING);
 }
 
-/* So it is told, however often the request is repeated. */
-static void a_base_that_goes_on_with_an_earlier_request_is_told(void **state)
+/* So it is reported, however often the request is repeated. */
+static void a_base_that_goes_on_with_an_earlier_request_is_reported(void **state)
 {
     (void)state;
     const uint8_t frame[] = {CREATE_OI_STREAM_HEADER, (uint8_t)(robot.stream.length - CREATE_OI_STREAM_OVERHEAD)};
@@ -523,7 +523,7 @@ int main(void)
         HEARD(a_base_that_was_not_heard_for_a_while_may_have_been_carried),
         HEARD(frames_of_an_earlier_request_are_no_answer),
         UNHEARD(what_tells_more_than_nothing_is_told_once),
-        UNHEARD(a_base_that_goes_on_with_an_earlier_request_is_told),
+        UNHEARD(a_base_that_goes_on_with_an_earlier_request_is_reported),
         HEARD(a_base_that_is_not_heard_for_half_a_second_stands),
         HEARD(what_has_waited_to_be_read_is_old),
         HEARD(a_mode_that_is_said_again_and_again_is_entered),
