@@ -21,7 +21,8 @@ BAG = files("crunchbot") / "data/first_minute.mcap"
 # A function of the command says that it is called; one that works does so again and again, so that the signal comes while
 # it does, however fast the machine is.
 STARTER = """
-import importlib, sys
+import importlib, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # as a terminal starts it
 module, name, again = sys.argv[1:4]
 module = importlib.import_module(module)
 real = getattr(module, name)
@@ -169,6 +170,7 @@ def test_what_goes_on_until_it_is_stopped_ends_well(folder, name):
 DROPPED = """
 import signal, sys, threading
 from crunchbot.ends import exit_code
+signal.signal(signal.SIGINT, signal.default_int_handler)  # as a terminal starts it
 
 class Deleted:
     def __del__(self):
