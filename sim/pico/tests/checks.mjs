@@ -24,6 +24,16 @@ function regular({ bench, judge }) {
 }
 function codes(run, lane) { return run.frames.map((f) => f.lanes[lane].code); }
 
+/** A board that a host knows, and the frames that it will send. */
+function recorded(lanes) {
+  const bench = new Bench(image, tmags(lanes));
+  bench.enumerate();
+  bench.board.run(60 * MS);
+  const frames = [];
+  bench.stream((raw) => frames.push(decode(raw)));
+  return [bench, frames];
+}
+
 const CHECKS = {
   what_the_chip_is_set_to() {
     const registers = new Registers(), run = started(tmags(16), { period: 30000 }, { registers });
@@ -33,11 +43,7 @@ const CHECKS = {
     regular(run);
   },
   a_run_begins_with_tick_0_at_any_moment() {
-    const bench = new Bench(image, tmags(1));
-    bench.enumerate();
-    bench.board.run(60 * MS);
-    const frames = [];
-    bench.stream((raw) => frames.push(decode(raw)));
+    const [bench, frames] = recorded(1);
     for (let i = 0; i < 80; i++) {
       frames.length = 0;
       same(bench.control(1, { mask: 1 }), null, 'start');
@@ -49,11 +55,7 @@ const CHECKS = {
     }
   },
   lanes_that_were_idle_begin_with_a_good_reading() {
-    const bench = new Bench(image, tmags(4));
-    bench.enumerate();
-    bench.board.run(60 * MS);
-    const frames = [];
-    bench.stream((raw) => frames.push(decode(raw)));
+    const [bench, frames] = recorded(4);
     for (let idle = 1; idle < 18; idle++) { // conversions are numbered modulo 8
       same(bench.control(1, { mask: 3 }), null, 'start');
       bench.board.run(2 * MS);
