@@ -7,8 +7,9 @@
  * other way counts / greatest chance if this way counts), never below 0; the greatest over all motions within SPREAD,
  * so that no wheel error speaks against a way that is in use. The chance that such a sum reaches S within n frames
  * is below n exp(-S): S = FIRST for the first verdict, REVISED to change it. A body that stands gives no evidence, and
- * too little is never evidence that remainders are dropped; the sums outlast interruptions, and go on: another base is
- * noticed.
+ * too little is never evidence that remainders are dropped. Nor is a number that comes again and again evidence that
+ * they are kept: a body that is pushed with a steady hand has one where they are dropped, and what is kept shows by
+ * numbers that go up and down. The sums outlast interruptions, and go on: another base is noticed.
  */
 #include <math.h>
 
@@ -47,10 +48,10 @@ static struct chances remainder_if_dropped(double least, double most, double rep
     return (struct chances){fmax(STRAY, (double)equal / POINTS), possible ? 1 : STRAY};
 }
 
-/* A number reported for a motion that was asked for, both in units and in the direction of that motion. What neither
- * way reports, as of a body that stands or is held back, weighs nothing. Nor does 0 against kept remainders where
- * dropped ones would report it: a body that stands reports it, too. */
-static void remainder_weigh(struct create_evidence *evidence, double asked, double reported)
+/* A number reported for a motion that was asked for, both in units and in the direction of that motion; again: the frame
+ * before reported it, too. What neither way reports, as of a body that stands or is held back, weighs nothing. Nor does
+ * 0 against kept remainders where dropped ones would report it: a body that stands reports it, too. */
+static void remainder_weigh(struct create_evidence *evidence, double asked, double reported, bool again)
 {
     const double least = asked * (1 - ODOMETRY_SPREAD), most = asked * (1 + ODOMETRY_SPREAD);
     const struct chances kept = remainder_if_kept(least, most, reported),
@@ -58,13 +59,13 @@ static void remainder_weigh(struct create_evidence *evidence, double asked, doub
     if (reported > 0) {
         evidence->against_kept = fmax(0, evidence->against_kept + log(dropped.average / kept.best));
     }
-    evidence->against_dropped = fmax(0, evidence->against_dropped + log(kept.average / dropped.best));
+    evidence->against_dropped = fmax(0, evidence->against_dropped + log(kept.average / (again ? 1 : dropped.best)));
 }
 
-static void remainder_weigh_part(struct create_evidence *evidence, double asked, int32_t reported)
+static void remainder_weigh_part(struct create_evidence *evidence, double asked, int32_t reported, int32_t before)
 {
     if (asked != 0) {
-        remainder_weigh(evidence, fabs(asked), asked > 0 ? reported : -reported);
+        remainder_weigh(evidence, fabs(asked), asked > 0 ? reported : -reported, reported == before);
     }
 }
 
@@ -91,10 +92,13 @@ static void remainder_decide(struct create_odometry *odometry)
 
 void remainder_watch(struct create_odometry *odometry, const struct create_frame *frame, struct odometry_units asked)
 {
-    if (remainder_settle(&odometry->evidence, frame) < SETTLED_FRAMES || frame->value[CREATE_OI_BUMPS_DROPS] != 0) {
-        return;
+    struct create_evidence *evidence = &odometry->evidence;
+    const int32_t distance = frame->value[CREATE_OI_DISTANCE], angle = frame->value[CREATE_OI_ANGLE];
+    if (remainder_settle(evidence, frame) >= SETTLED_FRAMES && frame->value[CREATE_OI_BUMPS_DROPS] == 0) {
+        remainder_weigh_part(evidence, asked.distance, distance, evidence->distance);
+        remainder_weigh_part(evidence, asked.angle, angle, evidence->angle);
+        remainder_decide(odometry);
     }
-    remainder_weigh_part(&odometry->evidence, asked.distance, frame->value[CREATE_OI_DISTANCE]);
-    remainder_weigh_part(&odometry->evidence, asked.angle, frame->value[CREATE_OI_ANGLE]);
-    remainder_decide(odometry);
+    evidence->distance = distance;
+    evidence->angle = angle;
 }

@@ -109,6 +109,21 @@ static void stray_numbers_are_not_believed(void **state)
     assert_int_equal(base.odometry.remainder, CREATE_UNKNOWN);
 }
 
+/* 5 mm a frame were asked for, and somebody makes 6 of them, steadily: more than the wheels' error. */
+static void a_push_is_no_evidence_that_remainders_are_kept(void **state)
+{
+    (void)state;
+    struct base base = base_begin(CREATE_1, CREATE_AUTO, false);
+    base_drive(&base, 337, 337, 3, 1.3);
+    assert_int_equal(base.odometry.remainder, CREATE_UNKNOWN);
+    base_drive(&base, 100, 100, 1, 1);
+    assert_int_equal(base.odometry.remainder, CREATE_DROPPED);
+    base_drive(&base, 337, 337, 3, 1.3);
+    assert_int_equal(base.odometry.remainder, CREATE_DROPPED);
+    base_drive(&base, -TURN_MM_S, TURN_MM_S, 1, 1);
+    assert_int_equal(base.odometry.standing, CREATE_CANNOT_TELL);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -119,6 +134,7 @@ int main(void)
         cmocka_unit_test(only_a_speed_that_separates_them_is_evidence),
         cmocka_unit_test(slow_turns_report_that_remainders_are_kept_and_never_that_they_are_dropped),
         cmocka_unit_test(evidence_outlasts_interruptions),
+        cmocka_unit_test(a_push_is_no_evidence_that_remainders_are_kept),
         cmocka_unit_test(stray_numbers_are_not_believed),
     };
     return cmocka_run_group_tests_name("remainder", tests, NULL, NULL);

@@ -45,8 +45,9 @@ enum create_standing {
 /* What speaks against either way to treat remainders: sums of logarithms of likelihood ratios, at least 0. */
 struct create_evidence {
     double against_kept, against_dropped;
-    int32_t left, right; /* asked for in the newest frame, mm/s */
-    uint32_t settled;    /* frames since that changed */
+    int32_t left, right;     /* asked for in the newest frame, mm/s */
+    int32_t distance, angle; /* reported in it */
+    uint32_t settled;        /* frames since other speeds were asked for */
 };
 
 struct create_odometry_settings {
