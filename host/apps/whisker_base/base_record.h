@@ -56,7 +56,7 @@ struct base_unframed {
     uint32_t all, text, boot; /* letters; what a boot loader repeats */
     uint32_t own, other;      /* beginnings of frames of this model, or of the other */
     uint8_t before;           /* the newest */
-    int64_t since_ms;         /* when the first came */
+    int64_t since_ms, to_ms;  /* when the first and the newest came */
 };
 
 /* Receives every frame's motion. */
@@ -91,6 +91,7 @@ struct base_robot {
     unsigned unheard_requests; /* since the newest frame */
     bool request_due;          /* another is to be written */
     unsigned recalls;          /* since a frame came */
+    int32_t told_mm_s;         /* to the right wheel, before the newest silence */
     bool repeated;             /* a stop was written behind the longest command since a frame or a silence */
     bool recalled;             /* by the newest: the line goes at another speed */
     bool answered;             /* a frame has come that the newest request asked for */

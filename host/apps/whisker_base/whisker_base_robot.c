@@ -19,6 +19,9 @@
 #define OWN_FRAMES 5
 /* From a request to the frame it asks for: both on the line, the period, what an adapter holds back. */
 #define ANSWER_MS (4 * CREATE_OI_PERIOD_MS)
+/* A base that is heard no more, though bytes come: its line may have another speed, where a stop takes so much longer
+ * that it cannot wait for the end of a silence. */
+#define ASTRAY_MS (5 * CREATE_OI_PERIOD_MS)
 #define BOOT_BYTE 0xfe /* of a boot loader that starts again and again, in reports of users */
 
 /* ---------------------------------------------------------------------------------------------------------- the line
@@ -259,6 +262,7 @@ bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
         if (robot->unframed.all == 0) {
             robot->unframed.since_ms = now_ms;
         }
+        robot->unframed.to_ms = got > 0 ? now_ms : robot->unframed.to_ms;
         for (int i = 0; i < got; i++) {
             whisker_base_robot_look_at(robot, bytes[i]);
             const bool asked = create_stream_push(&robot->stream, bytes[i], &robot->frame);
@@ -345,10 +349,11 @@ void base_robot_change_commander(struct base_robot *robot, bool taken, int64_t n
     }
 }
 
-/* What comes, for longer than from frame to frame, has neither frames nor text in it. */
-static bool whisker_base_robot_astray(const struct base_unframed *unframed, int64_t now_ms)
+/* What comes, for longer than from frame to frame, has neither text in it nor frames, but for one that was begun before.
+ */
+static bool whisker_base_robot_astray(const struct base_unframed *unframed)
 {
-    return unframed->all > 0 && now_ms - unframed->since_ms >= LATE_MS && unframed->own == 0 && unframed->other == 0 &&
+    return unframed->all > 0 && unframed->to_ms - unframed->since_ms >= LATE_MS && unframed->own <= 1 && unframed->other == 0 &&
            2 * unframed->text <= unframed->all && 2 * unframed->boot <= unframed->all;
 }
 
@@ -368,16 +373,16 @@ static const char *whisker_base_robot_cause(const struct base_unframed *unframed
 
 /* A line that stays silent is reported once, again when what comes tells more than nothing did, and then every hour. */
 static void whisker_base_robot_log_silence(struct base_robot *robot, const struct base_unframed *unframed,
-                                           int64_t now_ms)
+                                           int64_t silence_ms, int64_t now_ms)
 {
     const bool tells_more = robot->reported_nothing && unframed->all > 0;
     if (robot->reported_ms == 0 || tells_more || now_ms - robot->reported_ms >= BASE_TELL_MS) {
         robot->reported_ms = now_ms;
         robot->reported_nothing = unframed->all == 0;
         base_log(&robot->log.silence, LOG_WARN,
-                 "%s: no frame for %d ms: %s; ordered to stop, but the wheels may turn; asked "
+                 "%s: no frame for %lld ms: %s; ordered to stop, but the wheels may turn; asked "
                  "again every %d ms",
-                 robot->options->port, BASE_SILENCE_MS, whisker_base_robot_cause(unframed), BASE_SILENCE_MS);
+                 robot->options->port, (long long)silence_ms, whisker_base_robot_cause(unframed), BASE_SILENCE_MS);
     }
 }
 
@@ -390,9 +395,18 @@ static void whisker_base_robot_restart_stream(struct base_robot *robot, int64_t 
     robot->silent = true;
     robot->phase_frames = 0;
     const struct base_unframed unframed = robot->unframed;
+    const int64_t silence_ms = now_ms - whisker_base_robot_heard_ms(robot);
+    robot->told_mm_s = robot->recalls == 0 ? robot->written.right_mm_s : robot->told_mm_s;
     robot->repeated = false;
     base_request(robot, now_ms);
-    whisker_base_robot_log_silence(robot, &unframed, now_ms);
+    whisker_base_robot_log_silence(robot, &unframed, silence_ms, now_ms);
+}
+
+/* How long a base may say nothing. */
+static int64_t whisker_base_robot_patience_ms(const struct base_robot *robot)
+{
+    return !robot->silent && robot->answered && whisker_base_robot_astray(&robot->unframed) ? ASTRAY_MS
+                                                                                            : BASE_SILENCE_MS;
 }
 
 static int64_t whisker_base_robot_least(int64_t a, int64_t b)
@@ -425,17 +439,18 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
     if (whisker_base_robot_moving(robot) && now_ms - robot->drive_ms >= BASE_COMMANDER_MS) {
         whisker_base_robot_stop_commander(robot, now_ms);
     }
-    if (now_ms - whisker_base_robot_heard_ms(robot) >= BASE_SILENCE_MS) {
+    if (now_ms - whisker_base_robot_heard_ms(robot) >= whisker_base_robot_patience_ms(robot)) {
         whisker_base_robot_restart_stream(robot, now_ms);
     }
     if (robot->silent && !robot->recalled && now_ms - robot->opened_ms >= ANSWER_MS &&
-        whisker_base_robot_astray(&robot->unframed, now_ms)) {
+        whisker_base_robot_astray(&robot->unframed)) {
         base_recall(robot, now_ms);
     }
     if (!robot->answered && !robot->repeated && robot->unframed.own > OWN_FRAMES) {
         base_repeat(robot, now_ms);
     }
-    const int64_t silence_ms = whisker_base_robot_heard_ms(robot) + BASE_SILENCE_MS - now_ms;
+    const int64_t silence_ms =
+        whisker_base_robot_heard_ms(robot) + (robot->unframed.all > 0 ? ASTRAY_MS : BASE_SILENCE_MS) - now_ms;
     const int64_t commander_ms =
         whisker_base_robot_moving(robot) ? robot->drive_ms + BASE_COMMANDER_MS - now_ms : silence_ms;
     return (int)base_orders_due_ms(

@@ -72,7 +72,10 @@ static const char *whisker_base_state_mode_reason(const struct base_robot *robot
  * CREATE_OI_BAUD_WAIT_MS before it goes by it. */
 #define ORDER_LACKS 4
 #define RECALL_MS 500
-#define LIKELY 3 /* of three recalls two are at the first speeds, which one bit makes of an order to the wheels */
+/* Of three recalls two are at the first speeds, which one bit makes of an order to the wheels: by the upper byte of what
+ * it tells the right one. */
+#define LIKELY 3
+#define UPPER_BYTE 256
 static const uint8_t packets[] = {
     CREATE_OI_BUMPS_DROPS,
     CREATE_OI_CLIFF_LEFT,
@@ -130,7 +133,8 @@ void base_recall(struct base_robot *robot, int64_t now_ms)
 #undef BAUD
     uint8_t bytes[CREATE_COMMAND_BYTES];
     const uint32_t number = robot->recalls++, rest = number / LIKELY % (sizeof bauds / sizeof bauds[0]);
-    const uint32_t baud = bauds[number % LIKELY + 1 < LIKELY ? number % LIKELY : rest];
+    const uint32_t first = robot->told_mm_s / UPPER_BYTE == 1, turn = number % LIKELY;
+    const uint32_t baud = bauds[turn + 1 < LIKELY ? turn ^ first : rest];
     if (baud == robot->options->baud || !create_port_set_baud(robot->port, baud)) {
         return;
     }

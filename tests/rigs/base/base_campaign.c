@@ -956,14 +956,15 @@ static bool stays_awake(bool wire)
     return heard;
 }
 
-/* One bit of an order to the wheels is altered, and makes it one to the line: whether the base stands soon after the
- * silence is seen, and is heard again. */
+/* One bit of an order to the wheels is altered, and makes it one to the line: whether the base stands as soon as after
+ * any silence, and is heard again. */
 static bool is_recalled(uint64_t number, double speed_m_s)
 {
-    enum { FLIPPED_MS = 500, STOPPED_MS = 2000, AGAIN_MS = 4000 };
+    enum { FLIPPED_MS = 500, AGAIN_MS = 4000 };
     static const int32_t apart = CREATE_OI_OP_DRIVE_DIRECT ^ CREATE_OI_OP_BAUD;
     char text[80];
-    bool changed_baud = false, stopped = false;
+    bool changed_baud = false;
+    int64_t stopped_ms = 0, last_ms = 0; /* the last frame before */
     begin_draw(number);
     fault_count = 0;
     snprintf(text, sizeof text, "drive %g 0", speed_m_s);
@@ -983,12 +984,16 @@ static bool is_recalled(uint64_t number, double speed_m_s)
         base_robot_watch(&robot, now_ms);
         look_at_wheels();
         changed_baud |= deafened();
-        stopped |= changed_baud && now_ms < begin_ms + STOPPED_MS && !turning();
+        last_ms = changed_baud ? last_ms : heard_ms;
+        stopped_ms = changed_baud && stopped_ms == 0 && !turning() ? now_ms : stopped_ms;
     }
     const bool again = base_robot_heard(&robot) && !deafened();
     end_driver();
     sim_create_free(create);
-    return changed_baud && stopped && again;
+    if (stopped_ms - last_ms > SILENCE_MS) {
+        snprintf(logged, sizeof logged, "    stopped %lld ms after its last frame\n", (long long)(stopped_ms - last_ms));
+    }
+    return changed_baud && stopped_ms > 0 && stopped_ms - last_ms <= SILENCE_MS && again;
 }
 
 static void print_failure(uint64_t number)
