@@ -349,12 +349,13 @@ void base_robot_change_commander(struct base_robot *robot, bool taken, int64_t n
     }
 }
 
-/* What comes, for longer than from frame to frame, has neither text in it nor frames, but for one that was begun before.
+/* What comes, for longer than from frame to frame, has neither text in it nor frames, but for one that was begun
+ * before.
  */
 static bool whisker_base_robot_astray(const struct base_unframed *unframed)
 {
-    return unframed->all > 0 && unframed->to_ms - unframed->since_ms >= LATE_MS && unframed->own <= 1 && unframed->other == 0 &&
-           2 * unframed->text <= unframed->all && 2 * unframed->boot <= unframed->all;
+    return unframed->all > 0 && unframed->to_ms - unframed->since_ms >= LATE_MS && unframed->own <= 1 &&
+           unframed->other == 0 && 2 * unframed->text <= unframed->all && 2 * unframed->boot <= unframed->all;
 }
 
 /* Why nothing is heard, by what has come since. */

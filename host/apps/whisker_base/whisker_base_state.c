@@ -72,8 +72,8 @@ static const char *whisker_base_state_mode_reason(const struct base_robot *robot
  * CREATE_OI_BAUD_WAIT_MS before it goes by it. */
 #define ORDER_LACKS 4
 #define RECALL_MS 500
-/* Of three recalls two are at the first speeds, which one bit makes of an order to the wheels: by the upper byte of what
- * it tells the right one. */
+/* Of three recalls two are at the first speeds, which one bit makes of an order to the wheels: by the upper byte of
+ * what it tells the right one. */
 #define LIKELY 3
 #define UPPER_BYTE 256
 static const uint8_t packets[] = {

@@ -48,9 +48,9 @@ static struct chances remainder_if_dropped(double least, double most, double rep
     return (struct chances){fmax(STRAY, (double)equal / POINTS), possible ? 1 : STRAY};
 }
 
-/* A number reported for a motion that was asked for, both in units and in the direction of that motion; again: the frame
- * before reported it, too. What neither way reports, as of a body that stands or is held back, weighs nothing. Nor does
- * 0 against kept remainders where dropped ones would report it: a body that stands reports it, too. */
+/* A number reported for a motion that was asked for, both in units and in the direction of that motion; again: the
+ * frame before reported it, too. What neither way reports, as of a body that stands or is held back, weighs nothing.
+ * Nor does 0 against kept remainders where dropped ones would report it: a body that stands reports it, too. */
 static void remainder_weigh(struct create_evidence *evidence, double asked, double reported, bool again)
 {
     const double least = asked * (1 - ODOMETRY_SPREAD), most = asked * (1 + ODOMETRY_SPREAD);

@@ -991,7 +991,8 @@ static bool is_recalled(uint64_t number, double speed_m_s)
     end_driver();
     sim_create_free(create);
     if (stopped_ms - last_ms > SILENCE_MS) {
-        snprintf(logged, sizeof logged, "    stopped %lld ms after its last frame\n", (long long)(stopped_ms - last_ms));
+        snprintf(logged, sizeof logged, "    stopped %lld ms after its last frame\n",
+                 (long long)(stopped_ms - last_ms));
     }
     return changed_baud && stopped_ms > 0 && stopped_ms - last_ms <= SILENCE_MS && again;
 }
