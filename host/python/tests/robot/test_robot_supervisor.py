@@ -304,6 +304,33 @@ def test_the_end_of_the_one_that_all_need_is_the_end_of_all(tmp_path):
         Supervisor([FAILS, STAYS], tmp_path, until="fails").run(threading.Event())
 
 
+# Asked to end, it does so when another was asked, too.
+MEETS = 'trap "touch $0; while [ ! -e $1 ]; do sleep .01; done; echo met; exit 0" TERM; touch $2; while :; do sleep .01; done'
+
+
+def test_what_moves_no_wheels_is_ended_all_at_once_between_the_movers_and_the_one_that_all_need(tmp_path):
+    """One after the other they take longer than who pressed Ctrl-C waits."""
+    asked, ready, order = tmp_path / "asked", tmp_path / "ready", tmp_path / "order"
+    asked.mkdir(), ready.mkdir()
+
+    def meets(name: str, other: str) -> Program:
+        return Program.of(name, ["sh", "-c", MEETS, asked / name, asked / other, ready / name])
+
+    def notes(name: str, **options) -> Program:
+        script = 'trap "ls $0 >>$1; echo $2 >>$1; exit 0" TERM; touch $3; while :; do sleep .01; done'
+        return Program.of(name, ["sh", "-c", script, asked, order, name, ready / name], **options)
+
+    table = [notes("bridge"), meets("a", "b"), meets("b", "a"), notes("base", moves=True), notes("pilot", moves=True)]
+    stop = threading.Event()
+    thread = threading.Thread(target=Supervisor(table, tmp_path, until="bridge").run, args=(stop,))
+    thread.start()
+    assert await_true(lambda: len(list(ready.iterdir())) == len(table))
+    stop.set()
+    thread.join()
+    assert order.read_text().split() == ["pilot", "base", "a", "b", "bridge"]
+    assert all("met" in (tmp_path / f"{name}.log").read_text() for name in "ab")
+
+
 def test_what_never_ran_says_so_once_after_the_third_try(tmp_path):
     lines: list[str] = []
     kept = Kept(FAILS, tmp_path)

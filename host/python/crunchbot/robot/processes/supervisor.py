@@ -143,7 +143,7 @@ class Keeper:
 
 
 class Supervisor:
-    """`run` until stopped, or until the program `until` has ended. The table's first are started first and ended last."""
+    """`run` until stopped, or until the program `until` has ended, which is ended last."""
 
     def __init__(
         self,
@@ -227,12 +227,21 @@ class Supervisor:
         self._streams[name].send(ProcessHealth(header, name, keeper.pid, state, counters, keeper.last_error))
 
     def _close(self) -> None:
-        """The last in the table first, one after the other: the pilot stops the wheels while there is a base."""
-        for keeper in reversed(self._keepers):
-            keeper.ask_to_end()
-            give_up_s = time.monotonic() + GRACE_S
-            while keeper.pid and time.monotonic() < give_up_s:
-                self._look(LOOK_S)
-            keeper.close()
+        """What can move wheels from the last on, one after the other: the pilot stops them while there is a base. Then all
+        others at once, and what all depend on."""
+        moving = [k for k in reversed(self._keepers) if k.program.moves]
+        last = [k for k in self._keepers if k.program.name == self._until]
+        others = [k for k in self._keepers if k not in moving and k not in last]
+        for keepers in (*([keeper] for keeper in moving), others, last):
+            self._end(keepers)
         for keeper in self._reported():
             self._report_of(keeper, ENDED)
+
+    def _end(self, keepers: list[Keeper]) -> None:
+        for keeper in keepers:
+            keeper.ask_to_end()
+        give_up_s = time.monotonic() + GRACE_S
+        while any(keeper.pid for keeper in keepers) and time.monotonic() < give_up_s:
+            self._look(LOOK_S)
+        for keeper in keepers:
+            keeper.close()
