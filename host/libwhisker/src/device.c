@@ -170,15 +170,14 @@ static int device_stop(struct whisker_device *device)
     return control_run(device->hid, &device->settings, false) ? WHISKER_ERROR_DEVICE_CONTROL : WHISKER_OK;
 }
 
-/* A process that was killed leaves the bridge running and its FIFO full. */
+/* A process that was killed leaves the bridge running and its FIFO full; one that stopped it may leave frames, too. */
 static int device_discard_stale(struct whisker_device *device)
 {
     bool running;
     int error = control_is_running(device->hid, &running);
-    if (error || !running) {
-        return error;
+    if (!error && running) {
+        error = device_stop(device);
     }
-    error = device_stop(device);
     int got = 1;
     while (!error && got > 0) {
         libusb_bulk_transfer(device->handle, WHISKER_LIMIT_USB_BULK_IN, device->buffer, STALE_BYTES, &got,

@@ -276,7 +276,7 @@ static void start_queues_transfers_and_sends_the_settings(void **state)
     assert_int_equal(whisker_device_start(device, &settings, sink, &device), 0);
     assert_memory_equal(fake.control, report, sizeof report);
     assert_int_equal(fake.in_flight, QUEUED);
-    assert_string_equal(fake.events, "qS"); /* queued before the first frame is made */
+    assert_string_equal(fake.events, "rqS"); /* queued before the first frame is made */
     assert_int_equal(whisker_device_stop(device), 0);
     assert_int_equal(fake.control[WHISKER_REPORT_CONTROL_RUN], 0);
     close_and_check();
@@ -289,6 +289,18 @@ static void a_bridge_left_running_is_stopped_and_emptied_first(void **state)
     fake.stale_reads = 5;
     start_good();
     assert_string_equal(fake.events, "XrqS");
+    assert_true(fake.stale_reads < 0);
+    assert_int_equal(received_count, 0);
+    close_and_check();
+}
+
+/* Who stopped it did not read all that it had sent. */
+static void a_bridge_left_stopped_is_emptied_first(void **state)
+{
+    (void)state;
+    fake.stale_reads = 5;
+    start_good();
+    assert_string_equal(fake.events, "rqS");
     assert_true(fake.stale_reads < 0);
     assert_int_equal(received_count, 0);
     close_and_check();
@@ -484,6 +496,7 @@ int main(void)
         WITH_BRIDGE(who_throws_frames_away_queues_few_and_takes_few),
         WITH_BRIDGE(start_queues_transfers_and_sends_the_settings),
         WITH_BRIDGE(a_bridge_left_running_is_stopped_and_emptied_first),
+        WITH_BRIDGE(a_bridge_left_stopped_is_emptied_first),
         WITH_BRIDGE(bytes_come_in_order_and_transfers_are_queued_again),
         WITH_BRIDGE(flush_delivers_what_a_transfer_already_held),
         WITH_BRIDGE(refused_settings_are_reported),

@@ -9,6 +9,5 @@ LEASE_S = 0.2  # a guard, or a driver, silent for so long hangs
 LOOK_S = 0.02  # a turn of both processes' loops
 ALIVE_S = 0.05  # between two messages of theirs
 REPEAT_S = 1.0  # for so long an order of speed zero is repeated when driving has ended
-END_S = 0.5  # and when the process ends, too, which Ctrl-C does within 1 s
 STANDING, DRIVING = b"s", b"d"  # what a driver tells its guard
 LEASE = struct.Struct("d")  # what a guard tells its driver: until when the wheels may turn, by CLOCK_MONOTONIC

@@ -12,7 +12,7 @@ from ...errors import UserError
 from ...pilot import base as bits
 from ...stamping import stamp_output
 from ...stopping import stop_on_signals
-from . import ALIVE_S, DRIVING, END_S, LEASE, LEASE_S, LOOK_S, SILENCE_S, STANDING
+from . import ALIVE_S, DRIVING, LEASE, LEASE_S, LOOK_S, SILENCE_S, STANDING
 from .clients import Clients
 from .drive import Drive
 from .motion import Judge
@@ -85,10 +85,10 @@ class Driver:
         self._say_alive()
 
     def _end(self) -> None:
-        """Zero is repeated, for a base may have missed it."""
+        """Zero is repeated, for a base may have missed it; not for as long as else, for who presses Ctrl-C waits."""
         begin_s = time.monotonic()
         self._drive.stop(begin_s)
-        while self._drive.ending(now_s := time.monotonic()) and now_s - begin_s < END_S:
+        while self._drive.ending(now_s := time.monotonic()) and now_s - begin_s < SILENCE_S:
             self._drive.step(now_s)
             self._say_alive()
             time.sleep(LOOK_S)
