@@ -90,26 +90,17 @@ FIGURES = (
         drill_errors,
     ),
     Figure(
-        "docs/boards.md",
+        "docs/results/host.md",
         r"at most (\d+) us off",
         "host",
         lambda d: (f"{max(clock['error_us_max'] for clock in d['clock'].values()):.0f}",),
     ),
     Figure(
-        "docs/boards.md",
+        "docs/results/host.md",
         r"([\d ]+) frames, no gap, copy or wrong byte",
         "usb_soak",
         lambda d: (
             "" if any(d[key] for key in ("gaps", "duplicates", "wrong")) else f" {d['frames']:,}".replace(",", " "),
-        ),
-    ),
-    Figure(
-        "docs/boards.md",
-        r"([\d.]+) times as fast at 28 lanes, ([\d.]+) at one",
-        "levels",
-        lambda d: tuple(
-            f"{d['bytes'][at]['realtime_factor'] / d['rtl, SCK/6, gap 0.5 us'][at]['realtime_factor']:.{digits}f}"
-            for at, digits in ((-1, 1), (0, 0))
         ),
     ),
 )
