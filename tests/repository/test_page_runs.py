@@ -25,6 +25,7 @@ FILES = {  # what the pages' commands read, by what stands for it
     "models/texture.json": "examples/texture.json",
     "texture.json": "examples/texture.json",
     "new.csv": "examples/surfaces/ROUGH/1.csv",
+    "textures": "examples/surfaces",
     "textures/ROUGH/left_ROUGH1.csv": "examples/surfaces/ROUGH/1.csv",
     "room.yaml": "examples/home.yaml",
     "home.pgm": "examples/home.pgm",
@@ -57,6 +58,11 @@ ON_FILES = {
     "whisker radial predict lane2.json contacts.csv --json": '"radius_mm": ',
     "whisker radial follow lane2.json contacts.csv": "body whisk",
     "whisker texture classify models/texture.json textures/ROUGH/left_ROUGH1.csv": "ROUGH",
+    "whisker texture train textures --drive drive.mcap --scene scenes/run1 --out models/texture.json --overwrite": (
+        "textures/SMOOTH: 2 recordings added"
+    ),
+    "whisker texture train textures --drive drive.mcap --lanes 0,1 --surface ROUGH=0-1 --out models/texture.json "
+    "--overwrite": "textures/ROUGH: 2 recordings added",
     "whisker texture classify texture.json new.csv": "ROUGH",
     "whisker base SCENE --trial": "no table [base.ros2]; add it",
     "whisker base SCENE --socket base.sock": "no table [base.ros2]; add it",
@@ -72,7 +78,8 @@ WITH_BRIDGE = {
     "whisker calibrate --out calibration --scene scenes/mine": "rest (",
     "whisker doctor": " frames in ",
     "whisker top --scene scenes/mine --once": "lane",
-    "whisker stream --lanes 0,1 --frames 16000": "",
+    "whisker texture train textures --live --seconds 8 --surface VINYL --scene scenes/mine --out models/texture.json "
+    "--overwrite": "textures/VINYL: 2 recordings added",
     "whisker stream --lanes 0 --frames 8000": "",
     "whisker record drive.mcap --seconds 60 --scene scenes/robot": "frames",
     "whisker replay drive.mcap --ring replayed --speed 2": "frames",
@@ -138,7 +145,7 @@ LENGTHS = (
     ("--out scenes/mine", "--out scenes/mine --overwrite"),
     ("--out models/object_2.json", "--out models/object_2.json --overwrite"),
     ("--seconds 60", "--seconds 2"),
-    ("--frames 16000", "--frames 400"),
+    ("--seconds 8 ", "--seconds 0.5 "),
 )
 
 

@@ -2,26 +2,40 @@
 
 import argparse
 import json
+import re
 from collections import Counter
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from ..arguments import add_action, add_output, plain, warn
+from whisker_protocol import LANES, LIMITS
+
+from ..arguments import add_action, add_output, add_ring, lane_list, number_above, plain, warn
+from ..bridge.ring import await_reader
+from ..errors import UserError
 from ..nav.localise import SettingError
 from ..progress import bar as progress_bar
+from ..recording import read
+from ..robot.drives import DriveError, live, recorded, way
+from ..scene import Scene, load
+from ..stopping import stop_on_signals
 from ..tables import TableError
 from ..touch.texture import model as texture
 from ..touch.texture import train as texture_train
+from ..touch.texture.drive import INSIDE_M, Drive, Stretch, over_tiles, stated, write
+from ..touch.texture.lacking import lacking
 from ..touch.texture.spectral import HAZARD, HAZARD_LEAST
 
 METHODS = "default: spectra, calibrated on recordings held out; naive-bayes: the paper's equation 1"
+SPAN = re.compile(r"(?P<name>[^=/]+)(=(?P<first>[\d.]+)-(?P<last>[\d.]+))?")
 EXAMPLE = "whisker texture train examples/surfaces --out model.json"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "train", "learn from one folder per surface, one CSV per recording", EXAMPLE, train)
-    p.add_argument("folder")
+    p.add_argument("folder", help="of recordings; with --drive or --live those of the drive are put into it first")
+    add_drive(p)
     add_output(p, "--out", required=True, metavar="MODEL.JSON")
     p.add_argument("--method", choices=["naive-bayes", "default"], default="default", help=METHODS)
     p.add_argument("--window-ms", type=float, default=100.0, help="window to train for, of method default: %(default)s")
@@ -37,9 +51,42 @@ def add(parser: argparse.ArgumentParser) -> None:
     p.add_argument("--json", action="store_true", help="one object per line and window; of a folder: per surface")
 
 
+def add_drive(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--drive", type=Path, metavar="FILE.MCAP", help="add this drive's recordings; of 'whisker record'"
+    )
+    parser.add_argument("--live", action="store_true", help="add those of a drive that a ring shows from now on")
+    text = "of --live: stop after so many seconds"
+    parser.add_argument("--seconds", type=number_above(0.0), default=30.0, metavar="S", help=text)
+    text = "whose tiles were driven over, and whose robot.toml names the lanes"
+    parser.add_argument("--scene", type=Path, help=text)
+    text = "where the robot was: a CSV file of poses, a robot's bag, or a scene folder with observations (default: --scene)"
+    parser.add_argument("--way", type=Path, metavar="PATH", help=text)
+    text = "in place of --way: all of the drive was on this surface, or from one second of it to another"
+    parser.add_argument("--surface", type=_surface, action="append", metavar="NAME[=S-S]", help=text)
+    text = "of floor whiskers, without --scene, such as 0,1"
+    parser.add_argument("--lanes", type=lane_list(LANES), metavar="LIST", help=text)
+    add_ring(parser)
+
+
+def _surface(text: str) -> tuple[str, float, float]:
+    """An argument's type: a surface, and from when to when of the drive, s."""
+    found = SPAN.fullmatch(text)
+    try:
+        first, last = (float(found[part] or otherwise) for part, otherwise in (("first", "0"), ("last", "inf")))
+    except (TypeError, ValueError):
+        first, last = 1.0, 0.0
+    if not first < last:
+        raise argparse.ArgumentTypeError(f"'{text}' is no surface with times; give ROUGH, or ROUGH=3.5-20")
+    return found["name"], first, last
+
+
 def train(arguments: argparse.Namespace) -> int:
     window_ms = length_of_time(arguments.window_ms)
     hazard = changes_a_window(arguments.speed_m_s, arguments.tile_m, window_ms)
+    if add_recordings(arguments, window_ms) and len(texture.surface_files(arguments.folder)) < 2:
+        print(f"{arguments.folder}: one surface so far; drive over another, and the model is learnt")
+        return 0
     recordings, rate_hz = texture.read_training(arguments.folder, warn)
     files = texture.surface_files(arguments.folder)
     window = round(rate_hz * window_ms / 1000.0) if arguments.method == "default" else 0
@@ -65,7 +112,85 @@ def train(arguments: argparse.Namespace) -> int:
     print(f"{arguments.out}: {len(recordings)} classes: {', '.join(recordings)}")
     for line in report(model) if arguments.method == "default" else ():
         print(line)
+    speeds = {name: texture.speeds(some) for name, some in files.items()}
+    for line in lacking({name: len(some) for name, some in files.items()}, speeds):
+        print(line)
     return 0
+
+
+def add_recordings(arguments: argparse.Namespace, window_ms: float) -> bool:
+    """Put the recordings of --drive or --live into the folder, and say which they are; False: neither is given."""
+    if arguments.drive is None and not arguments.live:
+        return False
+    if arguments.drive and arguments.live:
+        raise UserError("texture train: --drive with --live; give one of them")
+    if arguments.live and not arguments.surface:
+        raise UserError("texture train: --live without --surface; name the surface that is driven over")
+    scene = load(arguments.scene) if arguments.scene else None
+    names = _lanes(arguments, scene)
+    drive, name = _drive(arguments)
+    found = _stretches(arguments, scene, names, drive, window_ms / 1000.0)
+    write(Path(arguments.folder), name, found, _columns(Path(arguments.folder)))
+    seconds, places = Counter(), {}
+    for s in found:
+        seconds[s.surface] += s.t_s[-1] - s.t_s[0]
+        places.setdefault(s.surface, set()).add(s.place)
+    for surface, total in sorted(seconds.items()):
+        count = sum(s.surface == surface for s in found)
+        print(
+            f"{arguments.folder}/{surface}: {count} recordings added, {total:.1f} s, of {len(places[surface])} places"
+        )
+    return True
+
+
+def _lanes(arguments, scene: Scene | None) -> dict[int, str]:
+    """Names of the floor whiskers by lane."""
+    if arguments.lanes is not None:
+        return {lane: f"lane{lane}" for lane in arguments.lanes}
+    if scene is None:
+        raise UserError("texture train: neither --scene nor --lanes; say which lanes are floor whiskers")
+    return {lane: w.name for lane, w in enumerate(scene.robot.whiskers) if w.role == "texture"}
+
+
+def _drive(arguments) -> tuple[Drive, str]:
+    """The samples, and a name that no other drive has."""
+    if arguments.drive:
+        with read(arguments.drive) as recording:
+            drive, name = recorded(recording, warn), arguments.drive.stem
+    else:
+        stop, name = stop_on_signals(), "live"
+        with await_reader(arguments.ring, arguments.wait, stop, arguments.ring_owner) as reader:
+            drive = live(reader, arguments.seconds, float(LIMITS["clock_hz"]), stop, warn)
+    return drive, f"{name}-{datetime.fromtimestamp(drive.began_ns / 1e9, UTC):%Y%m%dT%H%M%S}"
+
+
+def _stretches(arguments, scene: Scene | None, names: dict[int, str], drive: Drive, least_s: float) -> list[Stretch]:
+    """Those of the surfaces that were given, or that the way led over. DriveError without any."""
+    if arguments.surface:
+        start = drive.t_s[0]
+        asked = [(surface, start + first, start + last) for surface, first, last in arguments.surface]
+        found = [s for surface, *times in asked for s in stated(drive, names, surface, *times, least_s)]
+        if not found:
+            raise DriveError(
+                f"{arguments.drive or arguments.ring}: no window of samples at these times; give later or longer ones"
+            )
+        return found
+    if scene is None:
+        raise UserError("texture train: --drive with neither --scene nor --surface; say what was driven over")
+    source = arguments.way or arguments.scene
+    whiskers = {lane: w for lane, w in enumerate(scene.robot.whiskers) if lane in names and w.tip_m}
+    found = over_tiles(drive, way(source, scene, warn), whiskers, scene.arena, least_s)
+    if not found:
+        text = f"no tip moved for a window's time on one known tile, {100 * INSIDE_M:g} cm and two deviations inside"
+        raise DriveError(f"{source}: {text}; drive across the tiles, or give better poses by --way")
+    return found
+
+
+def _columns(folder: Path) -> tuple[str, ...]:
+    """The names of the channels of the recordings that are there, if they have two; else x, y."""
+    there = next(iter(sorted(folder.glob("[!.]*/[!.]*.csv"))), None)
+    names = texture.channel_names(there) if there else []
+    return tuple(names) if len(names) == 2 else ("x", "y")
 
 
 def advance(bar: Any, done: int, of: int) -> None:

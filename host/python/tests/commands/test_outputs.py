@@ -37,7 +37,7 @@ INPUTS = {
     "pilot --zenoh-config", "pyro --zenoh-config", "radial fit contacts", "radial predict contacts", "radial predict model",
     "radial follow contacts", "radial follow model", "record --scene", "replay file", "robot scene", "robot --models", "robot --out",
     "robot --port", "robot --zenoh-config", "ros2 scene", "ros2 --zenoh-config", "scene from kind", "scene from recording",
-    "scene map map", "scene map scene", "texture train folder", "texture classify model", "texture classify recording",
+    "scene map map", "scene map scene", "texture train folder", "texture train --drive", "texture train --scene", "texture train --way", "texture classify model", "texture classify recording",
     "top --scene", "view file", "view --records", "view --scene", "view --zenoh-config",
 }  # fmt: skip
 WORDS = {

@@ -30,11 +30,11 @@ def is_bag(path: Path) -> bool:
 
 
 def read_bag(
-    path: Path, warn: Callable[[str], None], given: str | None, topics: Path | None
+    path: Path, warn: Callable[[str], None], given: str | Scene | None, topics: Path | None
 ) -> tuple[Scene, Observations]:
-    """(scene, rows) of a bag, each damage asked to `warn`; the scene is the folder `given`, or the bag's. `topics`: a
+    """(scene, rows) of a bag, each damage asked to `warn`; the scene is `given`, or its folder, or the bag's. `topics`: a
     table of them, if they are ordinary ones. BagError when it holds none."""
-    scene = load(given) if given else None
+    scene = given if given is None or isinstance(given, Scene) else load(given)
     played = read_by_table(path, topics, scene) if topics else played_bag(path, ("observation", "truth"))
     for line in played.damage:
         warn(line)

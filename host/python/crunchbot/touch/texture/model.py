@@ -31,6 +31,7 @@ GAP_PERIODS = 4.0  # a longer step of the time column is a gap: no window reache
 STOPPED_MOST = 0.01  # share of a channel's samples at a stop of the sensor that is worth a word
 STUCK_LEAST, STUCK_MOST = 16, 0.25  # samples, and share of a recording, that one value may last
 NO_DIGITS = str.maketrans("", "", "0123456789")
+SPEED = "speed_m_s"  # column of how fast the tip goes; no channel
 RATES_APART = 0.1  # relative: recordings to be learnt together are sampled alike
 
 
@@ -201,7 +202,7 @@ def channel_names(path: str | Path) -> list[str]:
 def _channels(path, columns) -> dict[str, str | None]:
     """Channel -> column that is not 0 where its sample is missing, as `whisker stream` writes them; None: there is none."""
     streamed = {"tick", "sequence"} <= columns.keys()
-    others = {"t_s", "tick", "sequence"} if streamed else {"t_s"}
+    others = {"t_s", SPEED, "tick", "sequence"} if streamed else {"t_s", SPEED}
     status = {name for name in columns if streamed and name.endswith("_status")}
     places = {name: f"{name.rpartition('_')[0]}_status" for name in columns if name not in others | status}
     channels = {name: place if place in status else None for name, place in places.items()}
@@ -295,6 +296,12 @@ def surface_files(path: str | Path) -> dict[str, list[Path]]:
         if other != name:
             raise TableError(path, None, f"folders '{other}' and '{name}' name one surface twice; use one name")
     return files
+
+
+def speeds(files: list[Path]) -> list[float]:
+    """The median speed of each recording that tells it, m/s."""
+    known = [numbers(columns[SPEED]) for file in files if SPEED in (columns := read_columns(file, required=["t_s"]))]
+    return [float(np.nanmedian(speed)) for speed in known if np.isfinite(speed).any()]
 
 
 def recording_faults(samples: np.ndarray, t_s: np.ndarray | None = None) -> list[str]:
