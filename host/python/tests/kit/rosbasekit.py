@@ -8,14 +8,13 @@ import sys
 import threading
 import time
 import uuid
-from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.types import array, float64
 from patience import PATIENCE_S
-from rosdesk import Desk, Header, Point, Pose, PoseWithCovariance, Quaternion, Time, Vector3, apart, wait_for
+from rosdesk import Desk, Header, Point, Pose, PoseWithCovariance, Quaternion, Time, Vector3, apart, message, wait_for
 
 from crunchbot.pilot.base import Base, BaseError, BaseLost
 
@@ -35,36 +34,13 @@ SIGNED = 'signed_by = "the tests"\n'
 STILL = (0.0, 0.0)
 DOMAINS = count(100)  # one for each base
 
-
-@dataclass
-class Twist(IdlStruct, typename="geometry_msgs.msg.dds_.Twist_"):
-    linear: Vector3
-    angular: Vector3
-
-
-@dataclass
-class TwistStamped(IdlStruct, typename="geometry_msgs.msg.dds_.TwistStamped_"):
-    header: Header
-    twist: Twist
-
-
-@dataclass
-class TwistWithCovariance(IdlStruct, typename="geometry_msgs.msg.dds_.TwistWithCovariance_"):
-    twist: Twist
-    covariance: array[float64, 36]
-
-
-@dataclass
-class Odometry(IdlStruct, typename="nav_msgs.msg.dds_.Odometry_"):
-    header: Header
-    child_frame_id: str
-    pose: PoseWithCovariance
-    twist: TwistWithCovariance
-
-
-@dataclass
-class Bool(IdlStruct, typename="std_msgs.msg.dds_.Bool_"):
-    data: bool
+Twist = message("geometry_msgs/Twist", linear=Vector3, angular=Vector3)
+TwistStamped = message("geometry_msgs/TwistStamped", header=Header, twist=Twist)
+TwistWithCovariance = message("geometry_msgs/TwistWithCovariance", twist=Twist, covariance=array[float64, 36])
+Odometry = message(
+    "nav_msgs/Odometry", header=Header, child_frame_id=str, pose=PoseWithCovariance, twist=TwistWithCovariance
+)
+Bool = message("std_msgs/Bool", data=bool)
 
 
 def scene_folder(folder: Path, more: str = "", signed: str | None = SIGNED) -> Path:

@@ -2,13 +2,12 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsParticipant, BuiltinTopicDcpsPublication
 from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.idl import IdlStruct
+from cyclonedds.idl import IdlStruct, make_idl_struct
 from cyclonedds.idl.types import array, bounded_str, float32, float64, int8, int32, sequence, uint8, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
@@ -19,119 +18,46 @@ from patience import PATIENCE_S
 DOMAIN = 17
 
 
-@dataclass
-class Time(IdlStruct, typename="builtin_interfaces.msg.dds_.Time_"):
-    sec: int32
-    nanosec: uint32
+def message(name: str, /, **fields: Any) -> type[IdlStruct]:
+    """A type of ROS 2, "package/Type", as it is on the wire."""
+    package, kind = name.split("/")
+    return make_idl_struct(kind, f"{package}.msg.dds_.{kind}_", fields)
 
 
-@dataclass
-class Header(IdlStruct, typename="std_msgs.msg.dds_.Header_"):
-    stamp: Time
-    frame_id: str
-
-
-@dataclass
-class Vector3(IdlStruct, typename="geometry_msgs.msg.dds_.Vector3_"):
-    x: float64
-    y: float64
-    z: float64
-
-
-@dataclass
-class Point(IdlStruct, typename="geometry_msgs.msg.dds_.Point_"):
-    x: float64
-    y: float64
-    z: float64
-
-
-@dataclass
-class Quaternion(IdlStruct, typename="geometry_msgs.msg.dds_.Quaternion_"):
-    x: float64
-    y: float64
-    z: float64
-    w: float64
-
-
-@dataclass
-class Pose(IdlStruct, typename="geometry_msgs.msg.dds_.Pose_"):
-    position: Point
-    orientation: Quaternion
-
-
-@dataclass
-class PoseWithCovariance(IdlStruct, typename="geometry_msgs.msg.dds_.PoseWithCovariance_"):
-    pose: Pose
-    covariance: array[float64, 36]
-
-
-@dataclass
-class PoseWithCovarianceStamped(IdlStruct, typename="geometry_msgs.msg.dds_.PoseWithCovarianceStamped_"):
-    header: Header
-    pose: PoseWithCovariance
-
-
-@dataclass
-class Transform(IdlStruct, typename="geometry_msgs.msg.dds_.Transform_"):
-    translation: Vector3
-    rotation: Quaternion
-
-
-@dataclass
-class TransformStamped(IdlStruct, typename="geometry_msgs.msg.dds_.TransformStamped_"):
-    header: Header
-    child_frame_id: str
-    transform: Transform
-
-
-@dataclass
-class TFMessage(IdlStruct, typename="tf2_msgs.msg.dds_.TFMessage_"):
-    transforms: sequence[TransformStamped]
-
-
-@dataclass
-class JointState(IdlStruct, typename="sensor_msgs.msg.dds_.JointState_"):
-    header: Header
-    name: sequence[str]
-    position: sequence[float64]
-    velocity: sequence[float64]
-    effort: sequence[float64]
-
-
-@dataclass
-class MapMetaData(IdlStruct, typename="nav_msgs.msg.dds_.MapMetaData_"):
-    map_load_time: Time
-    resolution: float32
-    width: uint32
-    height: uint32
-    origin: Pose
-
-
-@dataclass
-class OccupancyGrid(IdlStruct, typename="nav_msgs.msg.dds_.OccupancyGrid_"):
-    header: Header
-    info: MapMetaData
-    data: sequence[int8]
-
-
-@dataclass
-class Gid(IdlStruct, typename="rmw_dds_common.msg.dds_.Gid_"):
-    data: array[uint8, 16]
-
-
-@dataclass
-class NodeEntitiesInfo(IdlStruct, typename="rmw_dds_common.msg.dds_.NodeEntitiesInfo_"):
-    node_namespace: bounded_str[256]
-    node_name: bounded_str[256]
-    reader_gid_seq: sequence[Gid]
-    writer_gid_seq: sequence[Gid]
-
-
-@dataclass
-class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common.msg.dds_.ParticipantEntitiesInfo_"):
-    gid: Gid
-    node_entities_info_seq: sequence[NodeEntitiesInfo]
-
+Time = message("builtin_interfaces/Time", sec=int32, nanosec=uint32)
+Header = message("std_msgs/Header", stamp=Time, frame_id=str)
+Vector3 = message("geometry_msgs/Vector3", x=float64, y=float64, z=float64)
+Point = message("geometry_msgs/Point", x=float64, y=float64, z=float64)
+Quaternion = message("geometry_msgs/Quaternion", x=float64, y=float64, z=float64, w=float64)
+Pose = message("geometry_msgs/Pose", position=Point, orientation=Quaternion)
+PoseWithCovariance = message("geometry_msgs/PoseWithCovariance", pose=Pose, covariance=array[float64, 36])
+PoseWithCovarianceStamped = message("geometry_msgs/PoseWithCovarianceStamped", header=Header, pose=PoseWithCovariance)
+Transform = message("geometry_msgs/Transform", translation=Vector3, rotation=Quaternion)
+TransformStamped = message("geometry_msgs/TransformStamped", header=Header, child_frame_id=str, transform=Transform)
+TFMessage = message("tf2_msgs/TFMessage", transforms=sequence[TransformStamped])
+JointState = message(
+    "sensor_msgs/JointState",
+    header=Header,
+    name=sequence[str],
+    position=sequence[float64],
+    velocity=sequence[float64],
+    effort=sequence[float64],
+)
+MapMetaData = message(
+    "nav_msgs/MapMetaData", map_load_time=Time, resolution=float32, width=uint32, height=uint32, origin=Pose
+)
+OccupancyGrid = message("nav_msgs/OccupancyGrid", header=Header, info=MapMetaData, data=sequence[int8])
+Gid = message("rmw_dds_common/Gid", data=array[uint8, 16])
+NodeEntitiesInfo = message(
+    "rmw_dds_common/NodeEntitiesInfo",
+    node_namespace=bounded_str[256],
+    node_name=bounded_str[256],
+    reader_gid_seq=sequence[Gid],
+    writer_gid_seq=sequence[Gid],
+)
+ParticipantEntitiesInfo = message(
+    "rmw_dds_common/ParticipantEntitiesInfo", gid=Gid, node_entities_info_seq=sequence[NodeEntitiesInfo]
+)
 
 # As rmw_cyclonedds makes it for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST.
 CONFIGURATION = (
