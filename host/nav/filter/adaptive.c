@@ -1,16 +1,15 @@
 /* The adaptive filter: its representation is as large as the uncertainty requires.
  *
- * Pose known: a cloud of hypotheses at exact poses, as many as its spread needs, or a Gaussian where that predicted the
- * rows as well. In doubt: an arena-wide histogram starts and takes the rows since which the robot may have been
- * kidnapped; the filter keeps both beliefs, weighted by how well they explained those rows. Pose unknown: the histogram
- * alone, until its mass lies in few enough cells for a cloud. While there are several modes it stays active beside the
- * cloud and sets their weights. docs/methods/localisation.md describes it. */
+ * Pose known: a cloud of hypotheses at exact poses, as many as its spread needs. In doubt: an arena-wide histogram
+ * starts and takes the rows since which the robot may have been kidnapped; the filter keeps both beliefs, weighted by
+ * how well they explained those rows. Pose unknown: the histogram alone, until its mass lies in few enough cells for a
+ * cloud. While there are several modes it stays active beside the cloud and sets their weights.
+ * docs/methods/localisation.md describes it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "adaptive_answer.h"
-#include "adaptive_gaussian.h"
 #include "adaptive_global.h"
 #include "adaptive_kidnap.h"
 #include "mixture.h"
@@ -24,19 +23,17 @@ static const double SHARE_LEAST = 1e-9, KNOWN_LEAST = 0.9, ONE_MODE = 0.999;
  * one that was drawn around the wrong place would explain itself. */
 static const double PROVEN = 300.0;
 
-/* The particles and what it takes to draw them; moved: how many were moved or weighed for the last row. */
+/* The particles and what it takes to draw them. */
 struct adaptive_cloud {
     struct nav_particles set;
     struct nav_bins bins;
     struct nav_sample sample;
     struct nav_rng rng;
-    long moved;
 };
 
 struct adaptive {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
-    struct adaptive_gaussian gaussian; /* what is held locally is it while it carries, the cloud otherwise */
     struct adaptive_cloud cloud;
     struct adaptive_global global;
     struct adaptive_log log;
@@ -58,7 +55,6 @@ static void adaptive_destroy(void *self)
     adaptive_kidnap_free(&a->kidnap);
     adaptive_log_free(&a->log);
     adaptive_global_free(&a->global);
-    adaptive_gaussian_free(&a->gaussian);
     nav_particles_free(&a->cloud.set);
     nav_bins_free(&a->cloud.bins);
     nav_likelihood_free(a->likelihood);
@@ -98,7 +94,6 @@ static struct adaptive_held adaptive_hold(const struct adaptive *a)
     double share = adaptive_kidnap_probability(a);
     bool two = adaptive_two(a);
     return (struct adaptive_held){.problem = a->problem,
-                                  .gaussian = a->gaussian.carries ? &a->gaussian.kalman.belief : NULL,
                                   .local = a->local ? &a->cloud.set : NULL,
                                   .global = two ? &a->global : NULL,
                                   .log = &a->log,
@@ -141,10 +136,7 @@ static void adaptive_begin(struct adaptive *a)
     a->local = !a->problem->prior.uniform && adaptive_begin_cloud(a);
     a->awake = !a->local;
     a->kidnap.proven = a->local ? (double)INFINITY : 0.0; /* a start that is given */
-    struct nav_gaussian prior = nav_mixture_prior(a->problem);
-    a->answer = prior.mean;
-    a->gaussian.compared = a->local && nav_gaussian_mass(&prior, NAV_NEAR_M, NAV_NEAR_RAD) >=
-                                           1.0 - a->problem->settings.adaptive.scattered;
+    a->answer = nav_mixture_prior(a->problem).mean;
     adaptive_sum_up(a);
 }
 
@@ -173,7 +165,6 @@ static void *adaptive_create(const struct nav_problem *problem)
     nav_rng_seed(&rng, problem->seed, 1);
     a->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
     if (!a->likelihood || adaptive_global_init(&a->global, problem, &a->likelihood->ground) || adaptive_init_cloud(a) ||
-        adaptive_gaussian_init(&a->gaussian, problem, a->likelihood) ||
         adaptive_log_init(&a->log, &a->likelihood->sensors) || adaptive_kidnap_init(&a->kidnap, a->likelihood, &rng)) {
         adaptive_destroy(a);
         return NULL;
@@ -217,7 +208,7 @@ static void adaptive_resample(struct adaptive *a, bool force)
         return;
     nav_bins_fill(&cloud->bins, &cloud->set);
     long count = nav_bins_needed(&cloud->bins, &cloud->sample, 0.0);
-    cloud->moved += cloud->set.count;
+    a->touched += cloud->set.count;
     nav_particles_resample(&cloud->set, count, nav_rng_uniform(&cloud->rng));
 }
 
@@ -239,9 +230,8 @@ static void adaptive_draw_particles(struct adaptive *a, double share)
     if (!a->local || share > 0.5)
         a->kidnap.proven = 0.0;
     a->local = true;
-    a->cloud.moved = set->count;
+    a->touched += set->count;
     adaptive_resample(a, true);
-    a->touched += a->cloud.moved;
     a->whole = true;
     a->modes = 0;
     adaptive_kidnap_clear(&a->kidnap, a->likelihood, a->log.head);
@@ -306,15 +296,6 @@ static void adaptive_drop_particles(struct adaptive *a)
     nav_map_forget(a->likelihood);
 }
 
-/* The Gaussian does not estimate the pose as well any more: hypotheses are drawn from it. */
-static void adaptive_scatter(struct adaptive *a)
-{
-    a->gaussian.carries = false;
-    a->gaussian.compared = 0;
-    adaptive_gaussian_draw(&a->gaussian, &a->cloud.set, &a->cloud.rng, a->cloud.sample.least);
-    a->touched += a->cloud.set.count;
-}
-
 /* Ends a search that has gone over all rows: what it found is drawn, or there was nothing in the rest of the arena, or
  * the cloud is wrong. */
 static void adaptive_end_search(struct adaptive *a, double present)
@@ -332,8 +313,6 @@ static void adaptive_decide(struct adaptive *a)
 {
     double present = adaptive_log_odds(a);
     bool kidnapped = present > log(a->problem->settings.adaptive.wake), shared = a->whole && a->local;
-    if (a->gaussian.carries && (kidnapped || adaptive_gaussian_fails(&a->gaussian)))
-        adaptive_scatter(a);
     if (!a->awake ? kidnapped
                   : shared && present > 0.0) /* a search of the whole arena costs what is known of the modes */
         adaptive_start_search(a);
@@ -347,8 +326,6 @@ static void adaptive_decide(struct adaptive *a)
 
 static void adaptive_search(struct adaptive *a)
 {
-    if (!a->awake)
-        return;
     adaptive_global_work(&a->global, &a->log, a->local ? 0.0 : a->problem->settings.motion.hazard);
     a->touched += a->global.touched;
     a->evaluations += a->global.touched;
@@ -359,8 +336,6 @@ static void adaptive_search(struct adaptive *a)
 static void adaptive_carry(struct adaptive *a)
 {
     double away = 1.0 - (1.0 - adaptive_kidnap_probability(a)) * (1.0 - NAV_CARRIED);
-    if (a->gaussian.carries)
-        adaptive_scatter(a);
     adaptive_kidnap_clear(&a->kidnap, a->likelihood, a->log.head);
     adaptive_start_search(a);
     a->odds = log(away) - log1p(-away);
@@ -378,31 +353,14 @@ static void adaptive_predict(void *self, const struct nav_motion *motion)
         adaptive_carry(a);
 }
 
-/* Whether a Gaussian estimates the pose as well: both take the same rows, from where the cloud is one compact mode. */
-static void adaptive_compare(struct adaptive *a, double cloud, double gaussian)
-{
-    struct adaptive_gaussian *g = &a->gaussian;
-    if (a->awake)
-        g->compared = 0;
-    else if (g->compared > 0)
-        g->carries = adaptive_gaussian_compare(g, cloud, gaussian);
-    else if (g->compared < 0)
-        g->compared++;
-    if (a->awake || g->compared != 0)
-        return;
-    static const struct nav_pending none = {.noise = {0.0, 0.0}};
-    struct nav_mode now = nav_particles_summary(&a->cloud.set, &a->cloud.bins, a->answer);
-    struct nav_gaussian belief = {.mean = now.mean};
-    nav_particles_covariance(&a->cloud.set, &none, now.mean, belief.covariance);
-    adaptive_gaussian_begin(g, &belief);
-    g->compared = now.mass >= 1.0 - a->problem->settings.adaptive.scattered;
-}
-
-/* Returns the row's log-likelihood. */
-static double adaptive_take_cloud(struct adaptive *a, double mass)
+/* Moves the hypotheses and weighs them; returns the row's log-likelihood. */
+static double adaptive_take_cloud(struct adaptive *a)
 {
     struct nav_particles *set = &a->cloud.set;
-    a->cloud.moved = 2 * set->count;
+    double mass = 1.0 - adaptive_kidnap_probability(a);
+    a->touched += 2 * set->count;
+    a->evaluations += set->count;
+    a->distinct += set->count;
     nav_particles_move(set, a->pending.step, &a->pending.noise, !a->pending_unknown, &a->cloud.rng);
     double local = nav_particles_weigh(set, a->likelihood, mass);
     if (a->awake && a->modes > 1)
@@ -410,30 +368,18 @@ static double adaptive_take_cloud(struct adaptive *a, double mass)
     return local;
 }
 
-static void adaptive_update_local(struct adaptive *a, const struct nav_evidence *evidence)
+static void adaptive_doubt(struct adaptive *a, double local)
 {
-    bool carries = a->gaussian.carries;
-    double mass = 1.0 - adaptive_kidnap_probability(a);
-    double local = adaptive_gaussian_take(&a->gaussian, &a->pending, evidence, carries ? mass : -1.0);
-    long worked = a->gaussian.looked;
-    a->cloud.moved = 0;
-    if (!carries) {
-        double gaussian = local;
-        local = adaptive_take_cloud(a, mass);
-        worked += a->cloud.set.count;
-        adaptive_compare(a, local, gaussian);
-    }
-    adaptive_log_entry(&a->log, a->log.head - 1)->local = local;
-    adaptive_kidnap_take(&a->kidnap, a->likelihood, a->log.head - 1,
-                         adaptive_kidnap_anywhere(&a->kidnap, a->likelihood), local);
+    uint64_t row = a->log.head - 1;
+    adaptive_log_entry(&a->log, row)->local = local;
+    adaptive_kidnap_take(&a->kidnap, a->likelihood, row, adaptive_kidnap_anywhere(&a->kidnap, a->likelihood), local);
+}
+
+static void adaptive_learn(struct adaptive *a)
+{
     if (!a->whole && a->kidnap.proven > PROVEN && a->problem->settings.map.learn >= 0.5)
         nav_map_learn(a->likelihood);
     nav_trust_learn(a->likelihood);
-    a->evaluations += worked;
-    a->distinct += worked;
-    if (!a->gaussian.carries)
-        adaptive_resample(a, false);
-    a->touched += a->gaussian.looked + a->cloud.moved;
 }
 
 /* After a motion that was not reported more poses are possible than the cloud has room for: the histogram holds them.
@@ -447,8 +393,6 @@ static void adaptive_hand_over(struct adaptive *a)
     if (!a->pending_unknown || !a->local || (a->awake && !a->whole) ||
         across * across * turned * s->adaptive.per_bin <= a->global.room)
         return;
-    if (a->gaussian.carries)
-        adaptive_scatter(a);
     adaptive_global_clear(&a->global, a->log.head);
     adaptive_give_particles(a, a->cloud.set.count, 1.0);
     a->local = a->whole = false;
@@ -456,18 +400,30 @@ static void adaptive_hand_over(struct adaptive *a)
     a->modes = 0;
 }
 
-static void adaptive_update(void *self, const struct nav_evidence *evidence)
+/* Takes what came with a row: its motion, and what its readings would be worth anywhere. */
+static void adaptive_read(struct adaptive *a, const struct nav_evidence *evidence)
 {
-    struct adaptive *a = self;
-    adaptive_hand_over(a);
     nav_likelihood_read(a->likelihood, evidence);
     adaptive_log_write(&a->log, a->pending.step, a->pending.noise, evidence, a->likelihood->unknown);
     a->answer = nav_compose(a->answer, a->pending.step);
-    if (a->local)
-        adaptive_update_local(a, evidence);
-    adaptive_search(a);
-    adaptive_decide(a);
-    adaptive_sum_up(a);
+}
+
+/* The algorithm; numbers are of the equations in docs/methods/localisation.md. */
+static void adaptive_update(void *self, const struct nav_evidence *evidence)
+{
+    struct adaptive *a = self;
+    adaptive_hand_over(a);      /* motion unknown, poses too many for a cloud: to the histogram */
+    adaptive_read(a, evidence); /* 3: likelihoods of the readings by what may be expected */
+    if (a->local) {
+        double local = adaptive_take_cloud(a); /* 2, 1: moves and weighs the cloud */
+        adaptive_doubt(a, local);              /* 5: odds of a kidnap, by "anywhere" */
+        adaptive_learn(a);                     /* 4: trust, and where the map is wrong */
+        adaptive_resample(a, false);           /* as many hypotheses as the cloud's spread asks for */
+    }
+    if (a->awake)
+        adaptive_search(a); /* 1 to 3, 5: the same of the histogram */
+    adaptive_decide(a);     /* 5: wakes the histogram, draws a cloud from it, drops either */
+    adaptive_sum_up(a);     /* 6: the answer */
     a->pending = (struct nav_pending){.step = {0.0, 0.0, 0.0}};
     a->pending_unknown = false;
 }
@@ -480,7 +436,7 @@ static void adaptive_estimate(const void *self, struct nav_estimate *out)
     out->evaluations = a->evaluations;
     out->distinct = a->distinct;
     out->touched = a->touched;
-    out->states = a->gaussian.carries ? 1 : a->local ? a->cloud.set.count : 0;
+    out->states = a->local ? a->cloud.set.count : 0;
     out->states += a->awake ? (long)adaptive_global_cells(&a->global) : 0;
     out->bytes = sizeof *a + nav_likelihood_bytes(a->likelihood) + adaptive_global_bytes(&a->global) +
                  adaptive_log_bytes(&a->log) + nav_particles_bytes(&a->cloud.set) + nav_bins_bytes(&a->cloud.bins);

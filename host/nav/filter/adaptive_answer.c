@@ -41,13 +41,6 @@ static struct said answer_local(const struct adaptive_held *h, struct nav_pose a
                                 const struct nav_pending *pending, struct nav_pose pose)
 {
     struct said said;
-    if (h->gaussian) {
-        struct nav_gaussian now = *h->gaussian;
-        nav_gaussian_move(&now, pending->step, &pending->noise);
-        nav_gaussian_covariance(&now, pose, said.covariance);
-        said.within = nav_gaussian_mass(&now, NAV_NEAR_M, NAV_NEAR_RAD);
-        return said;
-    }
     nav_particles_covariance(h->local, pending, pose, said.covariance);
     said.within = nav_particles_within(h->local, answer, pending, pose);
     return said;
@@ -72,11 +65,6 @@ long adaptive_answer_list(const struct adaptive_held *h, struct nav_pose answer,
                           struct nav_component *out, long room)
 {
     long count = 0;
-    if (h->gaussian) {
-        struct nav_gaussian now = *h->gaussian;
-        nav_gaussian_move(&now, pending->step, &pending->noise);
-        return nav_gaussian_components(&now, out, room);
-    }
     if (h->local)
         count = nav_particles_components(h->local, answer, pending, 1.0 - h->share, out, room);
     if (!(h->share > 0.0))
@@ -96,8 +84,6 @@ long adaptive_answer_list(const struct adaptive_held *h, struct nav_pose answer,
  * guess. */
 struct nav_pose adaptive_answer_pose(const struct adaptive_held *h, struct nav_bins *bins, struct nav_pose guess)
 {
-    if (h->gaussian)
-        return h->gaussian->mean;
     struct nav_mode local = {.mass = 0.0};
     if (h->local)
         local = nav_particles_summary(h->local, bins, guess);

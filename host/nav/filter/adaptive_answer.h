@@ -10,7 +10,6 @@
 /* What is held: one of the two at least. */
 struct adaptive_held {
     const struct nav_problem *problem;
-    const struct nav_gaussian *gaussian;  /* in the place of particles; NULL: not held */
     const struct nav_particles *local;    /* NULL: not held */
     const struct adaptive_global *global; /* NULL: asleep */
     const struct adaptive_log *log;

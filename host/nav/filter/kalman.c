@@ -7,7 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "kalman.h"
+#include "borders.h"
+#include "filter.h"
+#include "gaussian.h"
+#include "likelihood.h"
 #include "mixture.h"
 
 static const double GATE = 9.0;        /* squared standard deviations */
@@ -30,6 +33,18 @@ struct nav_kalman_linear {
 };
 
 struct nav_kalman;
+typedef void nav_kalman_linearise(struct nav_kalman *, const struct nav_kalman_sighting *, struct nav_kalman_linear *);
+
+struct nav_kalman {
+    const struct nav_problem *problem;
+    struct nav_gaussian belief;
+    nav_kalman_linearise *linearise;   /* NULL: nothing is corrected, and what follows is unused */
+    struct nav_likelihood *likelihood; /* for the texture models */
+    double *weight;                    /* [whiskers] of the row, object whiskers left out */
+    struct nav_borders borders;
+    long evaluations; /* expected observations worked out for the last row */
+};
+
 static void kalman_destroy(void *self)
 {
     struct nav_kalman *k = self;
@@ -55,7 +70,7 @@ static void *kalman_create(const struct nav_problem *problem, nav_kalman_lineari
     return NULL;
 }
 
-void nav_kalman_move(struct nav_kalman *k, struct nav_pose step, const struct nav_noise *noise)
+static void kalman_move(struct nav_kalman *k, struct nav_pose step, const struct nav_noise *noise)
 {
     nav_gaussian_move(&k->belief, step, noise);
     nav_borders_move(&k->borders, step);
@@ -65,7 +80,7 @@ static void kalman_predict(void *self, const struct nav_motion *motion)
 {
     struct nav_kalman *k = self;
     struct nav_noise noise = nav_motion_noise(&k->problem->robot, &k->problem->settings, motion);
-    nav_kalman_move(k, motion->step, &noise);
+    kalman_move(k, motion->step, &noise);
     if (motion->carried) {
         nav_gaussian_carry(&k->belief, &k->problem->arena);
         nav_borders_forget(&k->borders);
@@ -265,16 +280,7 @@ static void kalman_read_crossing(struct nav_kalman *k, const struct nav_crossing
         kalman_correct(k, &search.best);
 }
 
-int nav_kalman_init(struct nav_kalman *k, const struct nav_problem *problem, struct nav_likelihood *likelihood)
-{
-    *k = (struct nav_kalman){.problem = problem,
-                             .belief = nav_mixture_prior(problem),
-                             .linearise = kalman_linearise_mean,
-                             .likelihood = likelihood};
-    return nav_borders_init(&k->borders, &problem->arena, &problem->robot);
-}
-
-void nav_kalman_take(struct nav_kalman *k, const struct nav_evidence *evidence)
+static void kalman_take(struct nav_kalman *k, const struct nav_evidence *evidence)
 {
     struct nav_crossing crossing;
     const int *first = k->likelihood->sensors.first; /* texture, distance, normal; other sensors say nothing */
@@ -303,7 +309,7 @@ static void kalman_update(void *self, const struct nav_evidence *evidence)
     struct nav_evidence own = *evidence;
     own.weight = k->weight;
     nav_likelihood_read(k->likelihood, &own);
-    nav_kalman_take(k, evidence);
+    kalman_take(k, evidence);
 }
 
 static void kalman_estimate(const void *self, struct nav_estimate *out)

@@ -17,7 +17,7 @@ PAPER_STD_MM = (5.68, 2.78, 1.82, 4.37)  # the paper's table under Fig. 5, whisk
 WHAT = {
     "grid": "Exact Bayes on a fixed grid: every cell of the arena and every heading keeps its probability, which odometry moves "
     "and each row of readings multiplies (the paper's eq. 4).",
-    "adaptive": "The default: one Gaussian while that says all, particles while the belief has a shape, a histogram of the whole "
+    "adaptive": "The default: particles, as many as the belief's spread asks for, and a histogram of the whole "
     "arena while the robot may be anywhere; it passes from one to another by itself.",
     "foveal": "The paper's filter: 11 by 11 by 11 poses about the estimate, fused into one Gaussian after each row (eqs. 5-7). Its "
     "mean is one of these, 2.5 cm and 9 degrees apart: by chance worse than the wheels alone, and it may never come back.",

@@ -1,6 +1,7 @@
 """Kidnaps while mapping: noticed when they are, not said when they are not; the map of before is kept, and found again."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,21 @@ from crunchbot.scene import load
 from crunchbot_lab.scenes import map_scoring, own_map, write_scene
 
 ROWS, CARRIED = 3000, "free+carried"
-NOTICED, FOUND = 8, 6  # of MANY scenes, at least
+NOTICED = 8  # of MANY scenes, at least
+FOUND = 28 / 50  # old places, of ten maps with the filter's seeds 0 to 4
+CHANCE = 1e-3  # that the test fails where so many are found
+DRAWS = range(2)  # seeds of the filter
+
+
+def fewest(runs: int, share: float, chance: float) -> int:
+    """Most successes of which fewer have at most this chance. The maps of a test are given, and most are found with every
+    seed or with none: successes vary less than independent ones do."""
+    below = 0.0
+    for n in range(runs + 1):
+        below += math.comb(runs, n) * share**n * (1.0 - share) ** (runs - n)
+        if below > chance:
+            return n
+    return runs
 
 
 def noticed():
@@ -85,15 +100,16 @@ def test_nothing_is_noticed_where_nobody_was_carried(family, most):
 
 def test_the_old_place_is_found_in_the_map_that_was_kept(tmp_path):
     """From the folder of the map before the kidnap, start unknown."""
-    near = 0
+    found = []
     for made, run, seed in noticed():
         mapping.write_map(tmp_path / str(seed), run)
         own = own_map.OwnMap.of(run.before()[0])
         assert load(tmp_path / str(seed) / "part-0").arena == own.arena
         since = replace(made, observations=stretch(made.observations, made.kidnaps[0], ROWS))
-        found = own_map.located(own.arena, since, own.places(since.observations.truth), seed)
-        near += found.rows_to_lock is not None and found.error_m < 0.1
-    assert near >= FOUND
+        places = own.places(since.observations.truth)
+        found += [own_map.located(own.arena, since, places, draws) for draws in DRAWS]
+    near = sum(one.rows_to_lock is not None and one.error_m < 0.1 for one in found)
+    assert near >= fewest(len(found), FOUND, CHANCE)
 
 
 def test_the_folder_says_when_and_the_command_too(tmp_path, capsys):
