@@ -18,6 +18,8 @@ from .outputs import claim
 NO_USER = 2**32 - 1  # as a user id: nobody's
 UNKNOWN = "unrecognized arguments: "  # as argparse begins it
 NAME = "NAME"  # metavar of what is no path
+LIKE = 0.7  # share of letters that two words have in common: localize and localise, not gates and bytes
+SHOWN = 12  # choices in one line
 RING = "whisker"  # the name whiskerd's unit gives its ring
 
 
@@ -31,9 +33,6 @@ class Help(argparse.RawDescriptionHelpFormatter):
         )
         return f"{text} (default: %(default)s)" if is_plain and action.option_strings else text
 
-    def _get_default_metavar_for_positional(self, action: argparse.Action) -> str:
-        return action.dest.upper()
-
 
 class Parser(argparse.ArgumentParser):
     """Complaints are one line; help keeps its line breaks."""
@@ -46,12 +45,36 @@ class Parser(argparse.ArgumentParser):
         hint = nearest(words[0].partition("=")[0], options_of(self)) if words else ""
         self.exit(UserError.exit_code, f"{self.prog}: {message}{hint}; see '{self.prog} --help'\n")
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse's, but that nothing unknown is left for the command above, whose help would not show it."""
+        words = sys.argv[1:] if args is None else list(args)
+        first = words[0] if words else ""
+        if (
+            self.takes_commands()
+            and first.startswith("-")
+            and first.partition("=")[0] not in self._option_string_actions
+        ):
+            self.error(UNKNOWN + first)  # before the word behind it is taken for a command
+        found, unknown = super().parse_known_args(words, namespace)
+        if unknown:
+            self.error(UNKNOWN + " ".join(unknown))
+        return found, unknown
+
+    def takes_commands(self) -> bool:
+        return any(isinstance(action, argparse._SubParsersAction) for action in self._actions)
+
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """As argparse's, with the nearest choice in place of all where one is near."""
         choices = list(map(str, action.choices or ()))
         if choices and value not in (action.choices or ()):
-            hint = nearest(str(value), choices) or f" (choose from {', '.join(choices)})"
+            shown = f" (choose from {', '.join(choices)})" if len(choices) <= SHOWN else ""
+            hint = nearest(str(value), choices) or shown
             raise argparse.ArgumentError(action, f"invalid choice: {value!r}{hint}")
+
+    def _get_positional_kwargs(self, dest: str, **options: Any) -> dict[str, Any]:
+        """As argparse's, in capitals where it has no name of its own: in help and in complaints."""
+        given = super()._get_positional_kwargs(dest, **options)
+        return given if given.get("choices") else {"metavar": dest.upper(), **given}
 
     def show_example(self, command_line: str) -> None:
         """End the help with this."""
@@ -60,7 +83,8 @@ class Parser(argparse.ArgumentParser):
 
 def nearest(word: str, choices: list[str]) -> str:
     """ "; did you mean ...?" where one of the choices is like the word, else nothing."""
-    found = difflib.get_close_matches(word, choices, 1)
+    part = word.strip("-")
+    found = difflib.get_close_matches(word, choices, 1, LIKE) or [c for c in choices if len(part) > 2 and part in c]
     return f"; did you mean {found[0]}?" if found else ""
 
 
@@ -121,7 +145,9 @@ def actions_of(parser: argparse.ArgumentParser) -> Iterator[Any]:
 
 def is_path(action: Any) -> bool:
     """Whether an argument names a file or a folder, as far as its parser can know."""
-    return action.type in (Path, None) and action.nargs != 0 and not action.choices and action.metavar != NAME
+    return (
+        action.type in (Path, None, mcap_path) and action.nargs != 0 and not action.choices and action.metavar != NAME
+    )
 
 
 def plain(values: dict) -> dict:
@@ -145,7 +171,7 @@ def add_ring_owner(parser: argparse.ArgumentParser) -> None:
 def add_topics(parser: argparse.ArgumentParser) -> None:
     """--topics, for commands that read a robot's bag."""
     text = "table of which topic is which column, for a bag of ordinary topics (docs/formats.md); needs --scene"
-    parser.add_argument("--topics", type=Path, metavar="TABLE.toml", help=text)
+    parser.add_argument("--topics", type=Path, metavar="TABLE.TOML", help=text)
 
 
 def add_zenoh_config(parser: argparse.ArgumentParser, endpoints: str = "are those given here") -> None:
@@ -162,6 +188,13 @@ def user(text: str) -> int:
         if text.isascii() and text.isdigit() and int(text) < NO_USER:
             return int(text)
     raise argparse.ArgumentTypeError(f"there is no user '{text}'; give a user's name or number")
+
+
+def mcap_path(text: str) -> Path:
+    """An argument's type: a recording or bag that is written."""
+    if Path(text).suffix.lower() != ".mcap":
+        raise argparse.ArgumentTypeError(f"'{text}' does not end in .mcap; a recording is an MCAP file")
+    return Path(text)
 
 
 def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:

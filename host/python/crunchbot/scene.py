@@ -157,6 +157,13 @@ class Scene:
         return "\n".join([*lines, *self.simulated, _line("start", *start_pose)]) + "\n"
 
 
+def _or_make_one(place: Path) -> str:
+    """What to do about a place that is no scene folder."""
+    if Path(place).suffix.lower() in (".mcap", ".db3"):
+        return f"make one with 'whisker scene from {place} --out SCENE', or give a scene folder"
+    return "give a scene folder"
+
+
 def load(path: str | Path, map_file: str | Path | None = None) -> Scene:
     """Read a scene folder; prior.toml may be absent. SceneError names file, line or key, and the remedy.
 
@@ -165,7 +172,7 @@ def load(path: str | Path, map_file: str | Path | None = None) -> Scene:
     """
     folder = Path(path)
     if not folder.is_dir():
-        raise SceneError(f"{folder}: no such folder; give a scene folder with {ARENA} and {ROBOT}")
+        raise SceneError(f"{folder}: no such folder; {_or_make_one(folder)} with {ARENA} and {ROBOT}")
     scene = _read(folder, map_file)
     try:
         _ = scene.layout
@@ -194,7 +201,7 @@ def load_robot(path: str | Path) -> Robot:
     """The robot of a scene folder, whose arena is not read. SceneError names file, line or key, and the remedy."""
     folder = Path(path)
     if not folder.is_dir():
-        raise SceneError(f"{folder}: no such folder; give a scene folder with {ROBOT} and {OBSERVATIONS}")
+        raise SceneError(f"{folder}: no such folder; {_or_make_one(folder)} with {ROBOT} and {OBSERVATIONS}")
     return _robot(Table.read(folder / ROBOT), (LARGEST_M, LARGEST_M))
 
 

@@ -41,7 +41,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lanes", type=whole_number(1, LANES), metavar="N", help="populated lanes (the scene's whiskers)"
     )
-    parser.add_argument("--scene", help="scene folder (default: the demo's of this seed)")
+    parser.add_argument("--scene", metavar="SCENE", help="scene folder (default: the demo's of this seed)")
     text = "TOML: [[fault]] tables with tick or t_s, kind, and, for faults of a lane, lane (and bit or error)"
     parser.add_argument("--fault", metavar="FILE.TOML", help=text)
     parser.add_argument(
@@ -49,7 +49,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     text = "how finely whiskers bend"
     parser.add_argument("--mechanics", choices=MECHANICS, default=MECHANICS[0], help=text)
-    parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of world, sensors, start")
+    parser.add_argument(
+        "--seed", type=whole_number(0, 2**32 - 1), default=1, metavar="N", help="of world, sensors, start"
+    )
     text = "turn on the spot, stand still, or whisk: to one side and the other at a body whisk's rate"
     parser.add_argument("--drive", choices=list(COURSES), default="turn", help=text)
     text = "simulated seconds per second, at most what the machine can; 0: as fast as it can (default: 1)"

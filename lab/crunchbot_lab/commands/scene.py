@@ -2,7 +2,7 @@
 
 import argparse
 
-from crunchbot.arguments import add_action, add_output, add_topics, warn
+from crunchbot.arguments import add_action, add_output, add_topics, warn, whole_number
 from crunchbot.nav.filters import SettingError
 from crunchbot.nav.observations import observations_path, read_observations
 from crunchbot.outputs import made
@@ -17,8 +17,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "make", "draw a scene of a family, observations and truth included", EXAMPLE, make)
     p.add_argument("--family", metavar="F", help="a base and any modifiers, joined by '+'; see --list-families")
-    p.add_argument("--seed", type=int, default=0, help="draws arena, path and noise")
-    p.add_argument("--steps", type=int, metavar="N", help="rows of 0.1 s (default: the family's)")
+    p.add_argument("--seed", type=whole_number(0), default=0, metavar="N", help="draws arena, path and noise")
+    p.add_argument("--steps", type=whole_number(1), metavar="N", help="rows of 0.1 s (default: the family's)")
     add_output(p, "--out", own=HELD, metavar="DIR", help="folder to write")
     p.add_argument("--list-families", action="store_true", help="print bases and modifiers and leave")
     example = "whisker scene from robot-run/robot.mcap --out scenes/run"
@@ -51,8 +51,6 @@ def make(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.family is None or arguments.out is None:
         raise SettingError("scene make: needs --family and --out; see --list-families")
-    if arguments.seed < 0 or (arguments.steps is not None and arguments.steps < 1):
-        raise SettingError("scene make: --seed or --steps is too small; give 0 or more, and 1 or more")
     drawn = scenes.make(arguments.family, arguments.seed, arguments.steps)
     _write(arguments, drawn.scene, drawn.observations)
     print(f"{arguments.out}: {arguments.family}, seed {arguments.seed}, {len(drawn.observations.t_s)} rows")

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from .. import scene as scenes
-from ..arguments import add_output
+from ..arguments import add_output, mcap_path
 from ..outputs import claim, next_free
 from ..recording.writing import TopicWriter
 from ..robot.bags.played import RECORD
@@ -16,7 +16,8 @@ EXAMPLE = "whisker bag run.mcap --scene robot-run/scene"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    add_output(parser, "file", own=None, type=Path, metavar="FILE.MCAP")
+    text = "what is written"
+    add_output(parser, "file", own=None, type=mcap_path, metavar="FILE.MCAP", help=text)
     parser.add_argument(
         "--scene", type=Path, metavar="SCENE", help="keep this scene folder's files in the bag, and write /tf and /map"
     )

@@ -52,7 +52,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     text = "what 'whisker info --nodes' printed: the model then belongs to this lane's node, and is refused for others"
     parser.add_argument("--nodes", metavar="FILE", help=text)
-    parser.add_argument("--scene", help="scene folder whose robot.toml names the lanes, lane 0 first")
+    parser.add_argument("--scene", metavar="SCENE", help="scene folder whose robot.toml names the lanes, lane 0 first")
     parser.add_argument("--yes", action="store_true", help="ask nothing: whisks at the distances follow one another")
     parser.add_argument(
         "--backlog", action="store_true", help="begin with the oldest frame the ring holds, not the next"

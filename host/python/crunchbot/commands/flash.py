@@ -7,6 +7,9 @@ import argparse
 import os
 from pathlib import Path
 
+from whisker_protocol import LANES
+
+from ..arguments import whole_number
 from ..bridge import pico_drive
 from ..programs import SOURCE_TREE, program
 
@@ -22,8 +25,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--uf2", type=Path, default=PICO_IMAGE, metavar="FILE", help="of pico: this image, not the release's"
     )
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--lane", type=int, metavar="N", help="only the node on this lane")
-    which.add_argument("--serial", type=int, metavar="S", help="only the node with this serial number")
+    which.add_argument("--lane", type=whole_number(0, LANES - 1), metavar="N", help="only the node on this lane")
+    which.add_argument("--serial", type=whole_number(0), metavar="N", help="only the node with this serial number")
     parser.add_argument("--bridge", metavar="TEXT", help="the bridge with this serial number")
     parser.add_argument("--dry-run", action="store_true", help="say what would be done, change nothing")
     parser.add_argument(

@@ -4,7 +4,7 @@ import argparse
 import json
 import sys
 
-from ..arguments import add_output
+from ..arguments import add_output, whole_number
 from ..nav import localise
 from ..nav.faults import row_faults
 from ..nav.localise import SettingError
@@ -20,7 +20,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--filter", default=localise.default_filter(), metavar="NAME", help="see --list-filters"
     )
     vars(named)["values"] = localise.filter_names()  # for a shell's completion
-    parser.add_argument("--seed", type=int, default=0, help="of every random draw")
+    parser.add_argument("--seed", type=whole_number(0), default=0, metavar="N", help="of every random draw")
     text = "change a setting, see --list-settings"
     setting = parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=text)
     vars(setting)["values"] = [f"{name}=" for name, *_ in localise.settings_list()]
@@ -30,7 +30,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the summary as one line of JSON")
     parser.add_argument("--list-filters", action="store_true", help="print the filters' names and leave")
     parser.add_argument(
-        "--list-settings", action="store_true", help="print the settings with defaults and ranges and leave"
+        "--list-settings", action="store_true", help="print the settings, their values and ranges, and leave"
     )
     parser.set_defaults(run=run)
 

@@ -54,14 +54,18 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE",
         help="scene folder, of which robot.toml is read",
     )
-    parser.add_argument("--models", type=Path, required=True, help="folder with texture.json and <whisker>.json")
-    parser.add_argument("--nodes", help="what 'whisker info --nodes' printed: models of other nodes are refused")
+    parser.add_argument(
+        "--models", type=Path, required=True, metavar="DIR", help="folder with texture.json and <whisker>.json"
+    )
+    parser.add_argument(
+        "--nodes", metavar="FILE", help="what 'whisker info --nodes' printed: models of other nodes are refused"
+    )
     parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to read")
     add_ring_owner(parser)
     parser.add_argument("--base", metavar="SOCKET", help="of whisker-base")
     text = "of a simulation that waits for the pilot; without --base its wheels are driven directly"
     parser.add_argument("--simulation", metavar="SOCKET", help=text)
-    parser.add_argument("--seed", type=whole_number(0), default=1, help="of the random turns")
+    parser.add_argument("--seed", type=whole_number(0), default=1, metavar="N", help="of the random turns")
     add_choices(parser)
     add_link(parser, [PILOT_ENDPOINT], [NAVIGATOR_ENDPOINT])
     parser.add_argument(

@@ -15,19 +15,19 @@ EXAMPLE = "whisker radial fit examples/contacts.csv --out contacts.json"
 COLUMNS = "whisk_rad_s and base_rad_s, or push_mm_s, or depth_mm; direction_deg of the touch"
 DOUBTED_LEAST = 3  # fewer contacts say nothing of the whisker
 KINDS = """paper or linear: equation 3, a line through the peaks; rational: a curve instead; press: a regression at depths of
-a push, which answers during it, and the curve where it doubts; default: the one that predicts left-out places best"""
+a push, which answers during it, and the curve where it doubts (default: the one that predicts left-out places best)"""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "fit", "fit contacts of known radius", EXAMPLE, fit)
     p.add_argument("contacts", help="CSV: contact, radius_mm, t_s, channels; where known " + COLUMNS)
-    add_output(p, "--out", required=True, metavar="MODEL.JSON")
+    add_output(p, "--out", required=True, metavar="MODEL.JSON", help="the model, as JSON")
     p.add_argument("--model", choices=radial.MODELS, default="default", help=KINDS)
     p.add_argument("--json", action="store_true", help="the errors as one object on one line")
     example = "whisker radial predict examples/radial.json examples/contacts.csv --json"
     p = add_action(actions, "predict", "estimate the radius of each contact", example, predict)
-    p.add_argument("model")
+    p.add_argument("model", help="of 'whisker radial fit'")
     p.add_argument("contacts", help="CSV as for fit; radius_mm is not read and may be absent")
     p.add_argument("--json", action="store_true", help="one object per line and contact")
     text = "a press model's answers as each contact grows, one line for every tenth of its samples"

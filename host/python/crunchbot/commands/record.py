@@ -4,7 +4,7 @@ import argparse
 
 from whisker_protocol import LIMITS
 
-from ..arguments import add_output, add_ring, number_above, whole_number
+from ..arguments import add_output, add_ring, mcap_path, number_above, whole_number
 from ..bridge.ring import Reader, await_reader
 from ..recording.recorder import Tally, describe, record
 from ..recording.writing import RecordingWriter
@@ -15,11 +15,11 @@ EXAMPLE = "whisker record drive.mcap --seconds 60"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    add_output(parser, "file", metavar="FILE.MCAP")
+    add_output(parser, "file", type=mcap_path, metavar="FILE.MCAP", help="what is written")
     add_ring(parser)
     parser.add_argument("--frames", type=whole_number(1), metavar="N", help="stop after so many frames")
     parser.add_argument("--seconds", type=number_above(0.0), metavar="S", help="stop after so many seconds of frames")
-    parser.add_argument("--scene", help="scene folder whose robot.toml names the lanes, lane 0 first")
+    parser.add_argument("--scene", metavar="SCENE", help="scene folder whose robot.toml names the lanes, lane 0 first")
     parser.set_defaults(run=run)
 
 

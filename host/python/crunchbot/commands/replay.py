@@ -12,7 +12,7 @@ EXAMPLE = "whisker replay examples/drive.mcap --speed 2 --ring replayed"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE.MCAP")
+    parser.add_argument("file", metavar="FILE.MCAP", help="of 'whisker record'")
     parser.add_argument("--ring", default=RING, metavar="NAME", help="the ring to make")
     text = "how many times as fast as it was recorded, or max: as fast as the machine can; readers that fall behind by more than the ring lose frames"
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="X", help=text)

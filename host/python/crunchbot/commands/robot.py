@@ -38,10 +38,10 @@ SIMULATED_ROS2 = BaseTable(wheel_step_m_s=0.0285, topics=Topics())  # Create 2's
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", nargs="?", type=Path, metavar="SCENE", help="scene folder: arena, robot, prior")
     parser.add_argument("--models", type=Path, metavar="DIR", help="folder with texture.json and <whisker>.json")
-    parser.add_argument("--create", type=int, choices=(1, 2), default=1, help="the base: iRobot Create")
+    parser.add_argument("--create", type=whole_number(1, 2), choices=(1, 2), default=1, help="the base: iRobot Create")
     text = "what the base speaks (default: as robot.toml says); simulated, ros2 is a Create behind /cmd_vel and /odom"
     parser.add_argument("--base", choices=(CREATE, ROS2), help=text)
-    parser.add_argument("--port", type=Path, default=PORT, help="the base's serial port")
+    parser.add_argument("--port", type=Path, default=PORT, metavar="PATH", help="the base's serial port")
     parser.add_argument("--ring", default=RING, metavar="NAME", help="whiskerd's ring")
     text = "use the whiskerd that runs, systemd's for instance, by its --ring"
     parser.add_argument("--no-daemon", action="store_true", help=text)
@@ -51,7 +51,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--view-port", type=whole_number(0, 65535), default=VIEW_PORT, metavar="N", help="of the page")
     parser.add_argument("--out", type=Path, default=Path("robot-run"), metavar="DIR", help="logs, bag, truth")
     parser.add_argument("--no-view", action="store_true", help="no page for a browser")
-    parser.add_argument("--seed", type=whole_number(0, 2**32 - 1), default=1, help="of turns and simulation")
+    parser.add_argument(
+        "--seed", type=whole_number(0, 2**32 - 1), default=1, metavar="N", help="of turns and simulation"
+    )
     add_choices(parser)
     text = "be reached at this address, by anyone who reaches it (default: this machine only)"
     parser.add_argument("--listen", default=parts.LOOPBACK, metavar="ADDRESS", help=text)

@@ -26,7 +26,7 @@ from ..touch.texture.drive import INSIDE_M, Drive, Stretch, over_tiles, stated, 
 from ..touch.texture.lacking import lacking
 from ..touch.texture.spectral import HAZARD, HAZARD_LEAST
 
-METHODS = "default: spectra, calibrated on recordings held out; naive-bayes: the paper's equation 1"
+METHODS = "spectra, calibrated on recordings held out (default: default), or naive-bayes: the paper's equation 1"
 SPAN = re.compile(r"(?P<name>[^=/]+)(=(?P<first>[\d.]+)-(?P<last>[\d.]+))?")
 EXAMPLE = "whisker texture train examples/surfaces --out model.json"
 
@@ -34,19 +34,22 @@ EXAMPLE = "whisker texture train examples/surfaces --out model.json"
 def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "train", "learn from one folder per surface, one CSV per recording", EXAMPLE, train)
-    p.add_argument("folder", help="of recordings; with --drive or --live those of the drive are put into it first")
+    text = "a folder for each surface; with --drive or --live recordings of the drive are put into it first"
+    p.add_argument("folder", metavar="DIR", help=text)
     add_drive(p)
-    add_output(p, "--out", required=True, metavar="MODEL.JSON")
+    add_output(p, "--out", required=True, metavar="MODEL.JSON", help="the model, as JSON")
     p.add_argument("--method", choices=["naive-bayes", "default"], default="default", help=METHODS)
-    p.add_argument("--window-ms", type=float, default=100.0, help="window to train for, of method default: %(default)s")
-    text = "of a drive, with --tile-m: how often the surface changes; default: once in fifty windows"
-    p.add_argument("--speed-m-s", type=float, help=text)
-    p.add_argument("--tile-m", type=float, help="length of one surface along a drive, with --speed-m-s")
+    p.add_argument("--window-ms", type=number_above(0.0), default=100.0, metavar="MS", help="length of a window")
+    text = "of a drive, with --tile-m: how often the surface changes (default: once in fifty windows)"
+    p.add_argument("--speed-m-s", type=number_above(0.0), metavar="V", help=text)
+    p.add_argument(
+        "--tile-m", type=number_above(0.0), metavar="L", help="length of one surface along a drive, with --speed-m-s"
+    )
     example = "whisker texture classify examples/texture.json examples/surfaces/ROUGH/1.csv --window-ms 100 --json"
     p = add_action(actions, "classify", "classify the surface window by window", example, classify)
-    p.add_argument("model")
+    p.add_argument("model", help="of 'whisker texture train'")
     p.add_argument("recording", help="a CSV file, or a folder as for 'train': then a confusion matrix")
-    p.add_argument("--window-ms", type=float, default=100.0, help="length of a window")
+    p.add_argument("--window-ms", type=number_above(0.0), default=100.0, metavar="MS", help="length of a window")
     p.add_argument("--sequential", action="store_true", help='answer as soon as sure, "unknown" after four windows')
     p.add_argument("--json", action="store_true", help="one object per line and window; of a folder: per surface")
 
@@ -82,7 +85,7 @@ def _surface(text: str) -> tuple[str, float, float]:
 
 
 def train(arguments: argparse.Namespace) -> int:
-    window_ms = length_of_time(arguments.window_ms)
+    window_ms = arguments.window_ms
     hazard = changes_a_window(arguments.speed_m_s, arguments.tile_m, window_ms)
     if add_recordings(arguments, window_ms) and len(texture.surface_files(arguments.folder)) < 2:
         print(f"{arguments.folder}: one surface so far; drive over another, and the model is learnt")
@@ -211,17 +214,11 @@ def report(model: Any) -> list[str]:
     return lines + [f"not learned: {text}" for text in model.not_learned()]
 
 
-def length_of_time(window_ms: float) -> float:
-    if not 0.0 < window_ms < float("inf"):
-        raise SettingError(f"--window-ms {window_ms:g}: not a length of time; use 100")
-    return window_ms
-
-
 def changes_a_window(speed_m_s: float | None, tile_m: float | None, window_ms: float) -> float:
     """Changes of surface per window."""
     if speed_m_s is None and tile_m is None:
         return HAZARD
-    if speed_m_s is None or tile_m is None or not (speed_m_s > 0.0 and tile_m > 0.0):
+    if speed_m_s is None or tile_m is None:
         raise SettingError("--speed-m-s, --tile-m: give both, above 0, as in '--speed-m-s 0.1 --tile-m 0.5'")
     changes = speed_m_s * window_ms / 1000.0 / tile_m
     if not HAZARD_LEAST <= changes <= 1.0:
@@ -230,7 +227,7 @@ def changes_a_window(speed_m_s: float | None, tile_m: float | None, window_ms: f
 
 
 def classify(arguments: argparse.Namespace) -> int:
-    window_ms = length_of_time(arguments.window_ms)
+    window_ms = arguments.window_ms
     model = texture.load(arguments.model)
     if Path(arguments.recording).is_dir():
         return classify_folder(arguments, model, window_ms)

@@ -35,7 +35,7 @@ ENTER, LEAVE, HOME, REST, LINE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l",
 def add(parser: argparse.ArgumentParser) -> None:
     add_ring(parser)
     parser.add_argument("--interval", type=number_above(0.0), default=0.5, metavar="S", help="between pictures")
-    parser.add_argument("--scene", help="scene folder whose robot.toml names the lanes, lane 0 first")
+    parser.add_argument("--scene", metavar="SCENE", help="scene folder whose robot.toml names the lanes, lane 0 first")
     parser.add_argument("--once", action="store_true", help="print one picture after one interval and leave")
     parser.set_defaults(run=run)
 

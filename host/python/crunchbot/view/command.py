@@ -57,8 +57,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--connect",
         action="append",
         default=[],
-        metavar="tcp/HOST:PORT",
-        help="a process of the robot; repeatable (default: pilot and navigator of this machine)",
+        metavar="ENDPOINT",
+        help="a process of the robot, tcp/HOST:PORT or tls/HOST:PORT; repeatable (default: pilot and navigator of this machine)",
     )
     add_zenoh_config(parser)
     text = "where the page's button records to, each time a new file"

@@ -1,5 +1,6 @@
 """Who has what a robot needs: TCP ports, rings, serial ports, by the kernel's own lists. Of other users' processes only that they are there."""
 
+import errno
 import os
 import socket
 from collections.abc import Iterable, Iterator
@@ -30,6 +31,11 @@ def check_port(host: str, port: int, option: str) -> None:
             text = f"robot: {host}: {error.strerror}; give an address of this machine, as 127.0.0.1"
             raise HeldError(text) from None
         except OSError as error:
+            if error.errno in (errno.EADDRNOTAVAIL, errno.EACCES):
+                remedy = (
+                    "give an address of this machine" if error.errno == errno.EADDRNOTAVAIL else "take one from 1024 on"
+                )
+                raise HeldError(f"robot: port {port} of {host}: {error.strerror}; {remedy}") from None
             who = _reported(_holders(_sockets_at(port)))
             raise HeldError(
                 f"robot: port {port} of {host}: {error.strerror}{who}; end that, or choose another with {option}"
