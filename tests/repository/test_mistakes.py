@@ -129,6 +129,7 @@ OF_A_KIND = {  # what one option word takes in different commands, where it cann
     "--out": "a folder, or a file of one format",
     "--port": "of the base, or of TCP",
     "--lanes": "how many, or which",
+    "--drive": "of bridge-sim: how it moves; of texture train: a recording",
     "--base": "of robot: which kind; of pilot: its socket",
     "--listen": "of robot: an address for all its processes",
     "--serial": "of a bridge, which is a text, or of a node",

@@ -62,7 +62,7 @@ def add_drive(parser: argparse.ArgumentParser) -> None:
     text = "of --live: stop after so many seconds"
     parser.add_argument("--seconds", type=number_above(0.0), default=30.0, metavar="S", help=text)
     text = "whose tiles were driven over, and whose robot.toml names the lanes"
-    parser.add_argument("--scene", type=Path, help=text)
+    parser.add_argument("--scene", type=Path, metavar="SCENE", help=text)
     text = "where the robot was: a CSV file of poses, a robot's bag, or a scene folder with observations (default: --scene)"
     parser.add_argument("--way", type=Path, metavar="PATH", help=text)
     text = "in place of --way: all of the drive was on this surface, or from one second of it to another"
