@@ -376,6 +376,32 @@ static void a_base_that_says_the_same_whatever_is_ordered_is_not_heard(void **st
     assert_true(order_count > CREATE_COMMAND_MOST);
 }
 
+static void assert_may_turn(int64_t now_ms)
+{
+    base_robot_stop(&robot, now_ms);
+    assert_string_equal(base_robot_fate(&robot), "ordered to stop, but not heard to: the wheels may turn");
+}
+
+static void wheels_of_a_base_that_is_not_heard_may_turn(void **state)
+{
+    (void)state;
+    int64_t now_ms = OPENED_MS;
+    base_robot_stop(&robot, now_ms);
+    assert_string_equal(base_robot_fate(&robot), "wheels stopped");
+    for (int i = 0; i < 7; i++) { /* it goes on as before */
+        report(CREATE_OI_MODE_SAFE, 200, 3, now_ms += FRAME_MS);
+    }
+    assert_may_turn(now_ms);
+    report(CREATE_OI_MODE_SAFE, 0, 0, now_ms += FRAME_MS);
+    assert_string_equal(base_robot_fate(&robot), "wheels stopped");
+    base_robot_watch(&robot, now_ms += BASE_SILENCE_MS);
+    assert_may_turn(now_ms);
+    close(line); /* the cable is out */
+    base_robot_stop(&robot, now_ms + BASE_PACE_MS);
+    assert_int_equal(robot.port, -1);
+    assert_may_turn(now_ms);
+}
+
 /* Lost bytes may have left half an order, for the next one to complete. */
 static void an_order_after_a_pause_begins_with_zero_bytes(void **state)
 {
@@ -538,6 +564,7 @@ int main(void)
         HEARD(an_order_after_a_pause_begins_with_zero_bytes),
         HEARD(a_stop_that_is_not_heard_is_written_behind_the_longest_command),
         HEARD(a_base_that_says_the_same_whatever_is_ordered_is_not_heard),
+        HEARD(wheels_of_a_base_that_is_not_heard_may_turn),
         HEARD(orders_without_a_pause_leave_the_line_free_for_a_stop),
         HEARD(a_stop_is_tried_until_it_is_written),
         HEARD(the_clock_says_how_long_a_gap_is),

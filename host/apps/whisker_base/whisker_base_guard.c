@@ -70,7 +70,7 @@ static bool whisker_base_guard_stop_at_end(struct guard *guard, int status)
 
 static const char *whisker_base_guard_fate(bool stopped)
 {
-    return stopped ? "wheels stopped" : "no stop could be written: the wheels may turn; switch the base off";
+    return stopped ? "ordered to stop" : "no stop could be written: the wheels may turn; switch the base off";
 }
 
 static void whisker_base_guard_hold_port(struct guard *guard, int port)
@@ -172,7 +172,7 @@ static void whisker_base_guard_watch_driver(struct guard *guard)
         return;
     }
     if (!guard->stood && whisker_base_guard_stop_wheels(guard) && guard->stuck) {
-        base_log(&guard->log_hang, LOG_WARN, "the driver hangs; wheels stopped");
+        base_log(&guard->log_hang, LOG_WARN, "the driver hangs; %s", whisker_base_guard_fate(true));
     }
     if (!guard->stuck) {
         guard->stuck = true;
@@ -196,7 +196,7 @@ static void whisker_base_guard_hear_supervisor(struct guard *guard)
 {
     if (!heartbeat_read(&guard->heartbeat, cli_now_ms())) {
         guard->orphaned = true;
-        daemon_log(LOG_ERROR, "the supervisor has ended; wheels stopped, ending");
+        daemon_log(LOG_ERROR, "the supervisor has ended; ending");
     }
 }
 

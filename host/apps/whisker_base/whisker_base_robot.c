@@ -450,8 +450,9 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
     if (!robot->answered && !robot->repeated && robot->unframed.own > OWN_FRAMES) {
         base_repeat(robot, now_ms);
     }
-    const int64_t silence_ms =
-        whisker_base_robot_heard_ms(robot) + (robot->unframed.all > 0 ? ASTRAY_MS : BASE_SILENCE_MS) - now_ms;
+    const int64_t quiet_ms = now_ms - whisker_base_robot_heard_ms(robot);
+    const bool strange = robot->unframed.all > 0 && quiet_ms < ASTRAY_MS;
+    const int64_t silence_ms = (strange ? ASTRAY_MS : BASE_SILENCE_MS) - quiet_ms;
     const int64_t commander_ms =
         whisker_base_robot_moving(robot) ? robot->drive_ms + BASE_COMMANDER_MS - now_ms : silence_ms;
     return (int)base_orders_due_ms(

@@ -29,7 +29,7 @@ uint64_t base_robot_taken(const struct base_robot *robot);
 bool base_robot_drive(struct base_robot *robot, double v_m_s, double omega_rad_s, int64_t now_ms);
 bool base_robot_stop(struct base_robot *robot, int64_t now_ms);
 
-/* "wheels stopped", or that no stop could be written. */
+/* "wheels stopped", or why they may turn all the same. */
 const char *base_robot_fate(const struct base_robot *robot);
 
 /* Stops the wheels and keeps them so for this reason, or takes the reason back. */

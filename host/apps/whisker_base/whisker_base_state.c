@@ -32,7 +32,10 @@ bool base_robot_kept(const struct base_robot *robot)
 
 const char *base_robot_fate(const struct base_robot *robot)
 {
-    return base_orders_may_turn(robot) ? "no stop could be written: the wheels may turn" : "wheels stopped";
+    return base_orders_may_turn(robot) ? "no stop could be written: the wheels may turn"
+           : !base_robot_heard(robot) || robot->unheard >= UNHEARD_FRAMES
+               ? "ordered to stop, but not heard to: the wheels may turn"
+               : "wheels stopped";
 }
 
 int32_t base_robot_mode_reported(const struct base_robot *robot)

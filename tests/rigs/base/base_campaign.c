@@ -144,6 +144,7 @@ static bool measurable, disturbed, reported; /* since the odometry was measured 
 static int64_t turned_ms, leg_from_ms;
 static unsigned measured[2], within[2], measured_clean, within_clean;
 
+static int64_t stands_ms; /* since when the log says that the wheels stand, and nothing else was ordered; 0: it does not */
 static int64_t mode_wrong_ms, in_mode_ms[4], wheels_wrong_ms, lied_ms, stray_ms, deafened_ms;
 static char why[300];
 static char logged[4000];
@@ -243,6 +244,7 @@ void daemon_log(enum daemon_priority priority, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(line, sizeof line, format, arguments);
     va_end(arguments);
+    stands_ms = strstr(line, "wheels stopped") ? now_ms : strstr(line, "may turn") ? 0 : stands_ms;
     const size_t used = strlen(logged);
     snprintf(logged + used, sizeof logged - used, "    %6lld ms: %s\n", (long long)(now_ms - BEGIN_MS), line);
 }
@@ -383,6 +385,18 @@ static void judge_wheels(void)
         blame("ordered %d %d and said to be heard, but the wheels turn at %.0f %.0f for %lld ms",
               robot.written.left_mm_s, robot.written.right_mm_s, left_mm_s, right_mm_s,
               (long long)(now_ms - wheels_wrong_ms));
+    }
+}
+
+/* What the log says of the wheels is so, or it says soon that they may turn. */
+static void judge_log(void)
+{
+    const bool stood = !turning() || robot.speeds.left_mm_s != 0 || robot.speeds.right_mm_s != 0;
+    stands_ms = stood && stands_ms > 0 && turning() ? 0 : stands_ms;
+    const int64_t since_ms = heard_ms < stands_ms ? heard_ms : stands_ms;
+    if (!stood && stands_ms > 0 && now_ms - since_ms > BELIEVED_MS && now_ms > driver_ms + MARGIN_MS) {
+        blame("the log says \"wheels stopped\", the base was heard %lld ms ago, and they turn",
+              (long long)(now_ms - heard_ms));
     }
 }
 
@@ -556,7 +570,7 @@ static void begin_fault(const struct fault *fault)
     case KILL:
         end_driver();
         changed = false;
-        handed_ms = 0;
+        handed_ms = stands_ms = 0;
         sim_create_host_baud(create, options.baud);
         create_port_stop(PORT); /* the guard's */
         begin_driver(robot.port < 0 ? -1 : PORT);
@@ -755,7 +769,9 @@ static void drive_on(void)
     if (robot.port >= 0) {
         base_robot_read(&robot, UINT64_MAX, now_ms);
     }
-    base_robot_watch(&robot, now_ms);
+    if (base_robot_watch(&robot, now_ms) < 0) {
+        blame("the next is due in the past");
+    }
     command();
 }
 
@@ -872,6 +888,7 @@ static void begin_draw(uint64_t number)
     spoilt_orders = lied_frames = 0;
     heard_ms = to_robot_ms = to_host_ms = driver_ms = order_ms = ordered_ms = 0;
     mode_wrong_ms = wheels_wrong_ms = lied_ms = stray_ms = 0;
+    stands_ms = 0;
     deafened_ms = now_ms;
     memset(in_mode_ms, 0, sizeof in_mode_ms);
     active = 0;
@@ -925,6 +942,7 @@ static void run_draw(uint64_t number)
             judge_mode();
             judge_wheels();
             judge_handed();
+            judge_log();
         }
         judge_speeds();
         judge_recovery();
