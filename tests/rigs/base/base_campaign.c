@@ -144,7 +144,8 @@ static bool measurable, disturbed, reported; /* since the odometry was measured 
 static int64_t turned_ms, leg_from_ms;
 static unsigned measured[2], within[2], measured_clean, within_clean;
 
-static int64_t stands_ms; /* since when the log says that the wheels stand, and nothing else was ordered; 0: it does not */
+static int64_t
+    stands_ms; /* since when the log says that the wheels stand, and nothing else was ordered; 0: it does not */
 static int64_t mode_wrong_ms, in_mode_ms[4], wheels_wrong_ms, lied_ms, stray_ms, deafened_ms;
 static char why[300];
 static char logged[4000];
