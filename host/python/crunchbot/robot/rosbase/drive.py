@@ -72,7 +72,9 @@ class Drive:
         """What time brings."""
         reason = self.held(now_s)
         if self.driving and reason != "no":
-            self._tell(f"held: {reason}; wheels stopped")
+            seen = reason not in ("subscriber", "odometry")
+            fate = "wheels stopped" if seen else "ordered to stop, but not seen to: the wheels may turn"
+            self._tell(f"held: {reason}; {fate}")
             self.stop(now_s)
         elif self.driving and now_s - self._commanded_s >= COMMANDER_S:
             self.stops += 1
