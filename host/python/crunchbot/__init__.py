@@ -3,11 +3,16 @@
 `crunchbot.open` gives the rows of a scene folder, of a bag, or of a robot that runs (crunchbot.robot.opened).
 """
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
 __version__ = "0.1.0"
 
 
-def open(source, scene=None, wait_s=5.0, connect=()):
-    """Rows as crunchbot.robot.opened.opened has them. What it needs is imported only when it is called."""
+def open(source: str | Path, scene: str | Path | None = None, wait_s: float = 5.0, connect: Sequence[str] = ()) -> Any:
+    """Rows as crunchbot.robot.opened.opened gives them: `Rows`, or `LiveRows` of a robot that runs. What it needs is
+    imported only when it is called."""
     from importlib import import_module
 
     return import_module(".robot.opened", __name__).opened(source, scene, wait_s, connect)

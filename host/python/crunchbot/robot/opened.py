@@ -28,6 +28,7 @@ from .network.messages import NAME
 from .network.rows import Follower
 
 WIDE = 480  # pixels of a plan
+STARTED_HERE = Path("robot-run/scene")  # where `whisker robot` puts the scene of a simulated robot
 LOOK_S = 0.5  # between two looks whether rows have come
 
 
@@ -39,7 +40,7 @@ def opened(
     source: str | Path, scene: str | Path | None = None, wait_s: float = 5.0, connect: Sequence[str] = ()
 ) -> "Rows | LiveRows":
     """Rows of a scene folder, a bag, or of a robot of this name. `scene`: folder with arena and robot, for a bag that lacks
-    them and for a robot that runs. wait_s: for that robot's pilot; connect: its endpoints, tcp/HOST:PORT, if it is not on
+    them and for a robot that runs: without it that of `whisker robot --simulated`, started from here. wait_s: for that robot's pilot; connect: its endpoints, tcp/HOST:PORT, if it is not on
     this machine. UserError says what is missing."""
     path = Path(source)
     if path.is_dir() and observations_path(path).exists():
@@ -49,9 +50,9 @@ def opened(
         return Rows(*read_bag(path, lambda line: None, None if scene is None else str(scene), None))
     if path.exists() or not NAME.fullmatch(str(source)):
         raise OpenError(f"{source}: no rows; give a scene folder, a robot's bag, or the name of a robot that runs")
-    if scene is None:
+    if scene is None and not STARTED_HERE.is_dir():
         raise OpenError(f"{source}: rows of a running robot need its scene; give scene=FOLDER")
-    return LiveRows(str(source), load(scene), wait_s, connect or (PILOT_ENDPOINT, NAVIGATOR_ENDPOINT))
+    return LiveRows(str(source), load(scene or STARTED_HERE), wait_s, connect or (PILOT_ENDPOINT, NAVIGATOR_ENDPOINT))
 
 
 class Rows:

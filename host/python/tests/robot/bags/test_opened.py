@@ -1,5 +1,7 @@
 """crunchbot.open: one object for the rows of a folder, a bag and a running robot."""
 
+import inspect
+import shutil
 import subprocess
 import sys
 import threading
@@ -16,6 +18,7 @@ from crunchbot.nav.filters import Filter
 from crunchbot.observation import Row
 from crunchbot.robot.network.link import Link
 from crunchbot.robot.network.rows import RowPublisher
+from crunchbot.robot.opened import opened
 
 SENT = 12
 
@@ -48,7 +51,15 @@ def test_a_plan_shows_both_paths_and_says_what_they_are(folder):  # noqa: F811
     assert shown.count("<polyline") == 2 and "ekf: " in shown and "mm median" in shown
 
 
-def test_rows_of_a_running_robot_come_until_it_ends(folder):  # noqa: F811
+def test_its_types_are_one_line():
+    assert len(str(inspect.signature(crunchbot.open))) < 160 and len(str(inspect.signature(opened))) < 160
+
+
+def test_rows_of_a_running_robot_come_until_it_ends(folder, tmp_path, monkeypatch):  # noqa: F811
+    shutil.copytree(
+        folder, tmp_path / "robot-run/scene"
+    )  # as `whisker robot --simulated` leaves it where it is started
+    monkeypatch.chdir(tmp_path)
     endpoint, rows = free_endpoint(), list(crunchbot.open(folder))[:SENT]
     with Link("pilot", listen=[endpoint]) as pilot:
         publisher = RowPublisher(pilot)
@@ -60,7 +71,7 @@ def test_rows_of_a_running_robot_come_until_it_ends(folder):  # noqa: F811
                 publisher.send(row)
             publisher.end()
 
-        with crunchbot.open("robot", scene=folder, wait_s=60.0, connect=[endpoint]) as run:
+        with crunchbot.open("robot", wait_s=60.0, connect=[endpoint]) as run:
             sender = threading.Thread(target=send)
             sender.start()
             taken = run.take(SENT + 5)
