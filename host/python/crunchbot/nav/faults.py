@@ -1,4 +1,5 @@
-"""What a robot's sensors cannot have given: columns of rows judged, those of a file and those of a running robot alike.
+"""What a robot's sensors cannot have given, and answers where the map says nothing: columns of rows judged, those of a file
+and those of a running robot alike.
 
 The bounds are what the base can do, the length and deviation of the whiskers, and a row for each 0.1 s.
 """
@@ -10,7 +11,8 @@ import numpy as np
 
 from ..base_table import BaseTable
 from ..observation import DISTANCE, NORMAL, ODOMETRY, TIME
-from ..scene import Robot, Whisker
+from ..occupancy import from_map
+from ..scene import Robot, Scene, Whisker
 from .observations import Observations
 
 ROW_S = 0.1
@@ -34,6 +36,18 @@ def row_faults(rows: Observations, robot: Robot) -> list[str]:
         return ["no row has a reading; all answers are the odometry's" if len(rows) else "no rows; record some"]
     with np.errstate(invalid="ignore", over="ignore"):  # of infinite cells
         return [*_times(rows), *_motions(rows, robot.base), *_alike(_columns(rows, robot))]
+
+
+def ground_faults(poses: np.ndarray, scene: Scene) -> list[str]:
+    """A line where too many of the answers (n, 3) are on ground that nobody mapped."""
+    x, y, _ = from_map(poses, scene.origin).T
+    inside = np.zeros(len(poses), bool)
+    for x0, y0, x1, y1 in scene.arena.unknown:
+        inside |= (x >= x0) & (x < x1) & (y >= y0) & (y < y1)
+    if inside.sum() <= LEFT_MOST * len(poses):
+        return []
+    doubt = "where readings say little: the pose may be sure and wrong"
+    return [f"{inside.mean():.0%} of the rows are on ground that nobody mapped, {doubt}; map it"]
 
 
 def _alike(lines: Iterable[str]) -> Iterator[str]:

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from ..observation import ODOMETRY, TRUTH
-from ..occupancy import from_map
 from ..outputs import put
 from ..scene import Scene
 from .filters import ESTIMATE, Estimate, Filter, SettingError, default_filter, filter_names, settings_list, to_estimate
@@ -37,7 +36,6 @@ __all__ = [
 
 ESTIMATE_HEADER = "t_s,x_m,y_m,theta_rad,confidence"
 JUDGED_MOST = 200_000  # components of beliefs that are judged, for each row of the run
-UNMAPPED_MOST = 0.05  # as of rows that cannot be used: more is reported
 REGION_ROWS = 200  # coverage is judged on at most so many rows, evenly spread: a region costs more than a step
 
 
@@ -52,7 +50,6 @@ class Run:
     bad_cells: int
     bad_rows: int
     resolution: tuple[float, float, float, float] | None = None  # as Filter.resolution
-    unmapped: float = 0.0  # share of the answers that are on ground which nobody mapped
     levels: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the truth's region, at the judged rows
     areas_m2: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the 90 % regions there
 
@@ -92,16 +89,7 @@ def run(
     parts.append(made.replay(observations, first, len(observations) - first))
     table, step_us = (np.concatenate(column) for column in zip(*parts, strict=True))
     levels, areas = np.array(judged).reshape(-1, 2).T
-    unmapped = _unmapped(scene, table["pose"])
-    return Run(name, setup_s, step_us, table, made.bad_cells, made.bad_rows, made.resolution, unmapped, levels, areas)
-
-
-def _unmapped(scene: Scene, poses: np.ndarray) -> float:
-    x, y, _ = from_map(poses, scene.origin).T
-    inside = np.zeros(len(poses), bool)
-    for x0, y0, x1, y1 in scene.arena.unknown:
-        inside |= (x >= x0) & (x < x1) & (y >= y0) & (y < y1)
-    return float(inside.mean()) if len(inside) else 0.0
+    return Run(name, setup_s, step_us, table, made.bad_cells, made.bad_rows, made.resolution, levels, areas)
 
 
 def judged_rows(observations: Observations, most: int) -> list[int]:
@@ -173,9 +161,6 @@ def warnings(result: Run) -> list[str]:
     cell, _, wanted, start = result.resolution or (0.0, 0.0, 0.0, 0.0)
     name, asked = result.name, f"where the scene's detail asks for {wanted:.3g} m"
     out = []
-    if result.unmapped > UNMAPPED_MOST:
-        doubt = "where readings say little: the pose may be sure and wrong"
-        out += [f"{result.unmapped:.0%} of the rows are on ground that nobody mapped, {doubt}; map it"]
     if cell > 1.001 * wanted:
         out += [f"filter '{name}' has cells of {cell:.3g} m {asked}; set {name}.cell_m={wanted:.3g}"]
     if start > 0.0:

@@ -68,7 +68,7 @@ class Navigator:
         self._inbox = link.subscribe(ROWS, initial_pose.TOPIC, judge=RowChecks(scene))
         self._reported: Prior | None = None
         self._reported_error = ""
-        self._follower, self._watch = Follower(), RowWatch(scene.robot)
+        self._follower, self._watch = Follower(), RowWatch(scene.robot, scene)
         self._memory = Memory(settings.checkpoint, scene, settings.filters)
         self._beliefs_before: dict[str, np.ndarray] = {}
         self._tracks: list[Track] = []
@@ -205,6 +205,7 @@ class Navigator:
         pose = PoseWithCovariance.planar(estimate.pose, estimate.covariance)
         if track is self._tracks[0]:
             self._poses.send(PoseWithCovarianceStamped(header, pose))
+            self._watch.answer(estimate.pose)
         follower, seq = self._follower, step.row.seq
         counts = (step.rows, follower.skipped, follower.missed, follower.first_seq)
         self._answers.send(Localisation(header, track.name, pose, estimate.confidence, seq, *counts, self._prior))

@@ -17,6 +17,7 @@ from robotkit import Robot, take_until, to_rows
 from crunchbot import scene as scene_folder
 from crunchbot.errors import UserError
 from crunchbot.nav import localise
+from crunchbot.nav.faults import ground_faults
 from crunchbot.nav.filters import COMPONENT
 from crunchbot.observation import Row
 from crunchbot.occupancy import to_map
@@ -302,6 +303,24 @@ def test_a_row_that_cannot_be_is_refused_and_the_pose_is_as_without_it(made, kin
         )
         assert health_reported.counts["refused"] == str(int(hostile))
     assert reported[0] == reported[1]
+
+
+@pytest.mark.parametrize("mapped", [True, False])
+def test_answers_on_ground_that_nobody_mapped_are_told_as_of_a_file(made, monkeypatch, mapped):
+    monkeypatch.setattr("crunchbot.robot.row_watch.ROWS", ROWS)
+    _, scene, rows = made
+    unknown = () if mapped else ((0.0, 0.0, *scene.arena.size_m),)
+    scene = replace(scene, arena=replace(scene.arena, unknown=unknown))
+    with Inside(scene, "localisation", "health/navigator", lock_step=True) as inside:
+        for row in rows:
+            inside.rows.send(Row.of(row))
+        inside.rows.end()
+        inside.run()
+        got = take_until(inside.inbox, _all_over, PATIENCE_S)
+    poses = [r.message.pose.pose.xytheta for r in got if r.topic == "localisation" and not r.over]
+    told = ground_faults(np.array(poses), scene)
+    health_reported = [r.message for r in got if r.topic == "health/navigator" and not r.over][-1]
+    assert len(told) != mapped and health_reported.last_error == "".join(f"rows: {line}" for line in told)
 
 
 def test_rows_of_another_robot_are_refused_by_name_and_the_navigator_stays(made):
