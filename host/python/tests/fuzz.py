@@ -12,7 +12,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 LAB = HERE.parents[2] / "lab/tests"
-TARGETS = {path.stem.removeprefix("fuzz_"): path for tests in (HERE, LAB) for path in tests.glob("*/fuzz_*.py")}
+TARGETS = {path.stem.removeprefix("fuzz_"): path for tests in (HERE, LAB) for path in tests.glob("**/fuzz_*.py")}
 MEMORY_MOST = 2 << 30  # address space a run may take: what a length in a file asks for is not believed
 
 

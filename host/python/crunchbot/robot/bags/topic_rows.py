@@ -47,9 +47,7 @@ class Source:
                 return None
             value = message.range * (1.0 if self.reach_mm is None else 1000.0)
         elif hasattr(message, "position"):
-            if self.joint not in message.name:
-                raise ValueError(f"no joint '{self.joint}'; it has {', '.join(message.name)}")
-            value = float(message.position[list(message.name).index(self.joint)])
+            value = float(dict(zip(message.name, message.position, strict=False)).get(self.joint, math.nan))
         else:
             felt = next((getattr(message, name) for name in CONTACTS if hasattr(message, name)), None)
             if not isinstance(felt, bool | list) or "contact" not in self.numbers:
@@ -68,16 +66,24 @@ def read_by_table(path: Path, table: Path, scene: Scene | None) -> Played:
         raise BagError(f"{path}: a table of topics fills the columns of a scene; give the scene with --scene")
     sources = _sources(table, scene)
     cells: dict[str, list] = {column: [] for column in sources}
+    joints: dict[str, set[str]] = {}  # by topic: each of its messages may be of other joints
     with RosBag(path) as bag:
         if missing := {source.topic for source in sources.values()} - bag.topics.keys():
             raise BagError(f"{path}: no topic {min(missing)}; it has {', '.join(sorted(bag.topics))}")
         for message in bag.messages():
-            for column in [column for column, source in sources.items() if source.topic == message.topic]:
+            columns = [column for column, source in sources.items() if source.topic == message.topic]
+            decoded = bag.decoded(message) if columns else None
+            if hasattr(decoded, "position"):
+                joints.setdefault(message.topic, set()).update(decoded.name)
+            for column in columns:
                 read = _place if column == MOTION else sources[column].cell
                 try:
-                    cells[column].append((message.log_time, read(bag.decoded(message))))
+                    cells[column].append((message.log_time, read(decoded)))
                 except ValueError as error:
                     raise BagError(f"{path}: {message.topic}: {error}") from None
+        for source in sources.values():
+            if source.joint not in (known := joints.get(source.topic, {source.joint})):
+                raise BagError(f"{path}: {source.topic}: no joint '{source.joint}'; it has {', '.join(sorted(known))}")
         return Played("robot", scene, _said(bag, cells, scene), bag.damage)
 
 

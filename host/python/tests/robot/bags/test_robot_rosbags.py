@@ -181,6 +181,13 @@ def place(t: float) -> tuple[float, float, float]:
     return SPEED / TURN * math.sin(theta), -SPEED / TURN * math.cos(theta), theta
 
 
+def joints(n: int, lamp: float) -> tuple[list[str], np.ndarray]:
+    """Names and positions of message n: of each four one is of another joint alone, and one gives no positions."""
+    if n % 4 == 1:
+        return ["arm"], np.array([9.0])
+    return ["arm", "lamp"], np.array([9.0, lamp] if n % 4 != 3 else [])
+
+
 def ordinary(folder, storage, seconds=3.0, gap=(9.0, 9.0), headless=(), start_ns=START_NS):
     """20 Hz of odometry, 15 Hz of ranges, 40 Hz of joints, 30 Hz of contacts. Stamps are of another clock: zero."""
     types = get_typestore(Stores.ROS2_JAZZY)
@@ -209,7 +216,7 @@ def ordinary(folder, storage, seconds=3.0, gap=(9.0, 9.0), headless=(), start_ns
         ),
         "/joint_states": (
             40,
-            lambda t: new["JointState"](header, ["arm", "lamp"], np.array([9.0, 0.1 * t]), np.zeros(0), np.zeros(0)),
+            lambda t: new["JointState"](header, *joints(round(40 * t), 0.1 * t), np.zeros(0), np.zeros(0)),
         ),
         "/bumper": (30, lambda t: new["Bool"](1.0 < t < 1.2)),
         "/contacts": (30, lambda t: new["Contacts"](header, [touch("a", "b")] if t > 2 else [])),
