@@ -44,7 +44,7 @@ def read_rows(path: str | Path) -> tuple[list[str], list[list[str]]]:
     first = next((n for n, (_, row) in enumerate(lines) if not row[0].startswith("#")), len(lines))
     if first and first < len(lines) and math.isfinite(number(lines[first][1][0])):
         first -= 1
-    if first == len(lines):
+    if first == len(lines) or all(math.isfinite(number(cell or "0")) for cell in lines[first][1]):
         raise TableError(path, 1, "no header line; name the columns in the first line")
     at, names = lines[first]
     header = [_name(cell) for cell in (names[0].lstrip("#"), *names[1:])]

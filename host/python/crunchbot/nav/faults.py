@@ -22,6 +22,9 @@ ROW_MOST_M, ROW_MOST_RAD = 1.0, math.pi  # what intake.c takes in one row: the b
 SLACK_M, SLACK_RAD = 0.05, 0.1  # beyond what the base can do: for reports that come a little late
 LENGTH_SLACK = 1.5  # of a whisker's length, within which a distance is read (range_model.c)
 ACCURACY = 0.87  # of windows (texture_model.c)
+SIDEWAYS_MOST = 0.5  # of the way ahead, for wheels that do not slide; motion in the map's frame has as much of both
+TWINS_LEAST = 10  # rows with a contact in which two whiskers cannot read alike to the last digit
+CONSTANT_LEAST = 100  # rows in which the base moves: even one that drives evenly is measured with noise
 LEFT_MOST = 0.05  # share of rows or cells that may be left out without a word
 CHANCE = 1e-6  # of what is called impossible
 SECONDS, METRES = {"ms": 1e3, "us": 1e6, "ns": 1e9}, {"cm": 1e2, "mm": 1e3}
@@ -66,6 +69,10 @@ def _columns(rows: Observations, robot: Robot) -> Iterator[str]:
     moved = rows.odometry.any(axis=1)
     for n, whisker in enumerate(robot.of_role("object")):
         yield from _distances(whisker, rows.radial_m[:, n], robot.radial_sigma_m, moved)
+        for other, whole in zip(robot.of_role("object")[:n], rows.radial_m.T, strict=False):
+            touching = np.isfinite(whole) | np.isfinite(rows.radial_m[:, n])
+            if touching.sum() >= TWINS_LEAST and np.array_equal(whole[touching], rows.radial_m[touching, n]):
+                yield f"'{whisker.name}_{DISTANCE}' is that of {other.name} in every row; give each whisker its own"
         if rows.normal is not None:
             angle, deviation = rows.normal[:, n].T
             good = (np.abs(angle) <= math.tau) & (deviation > 0.0) & (deviation <= math.pi)
@@ -85,7 +92,8 @@ def _left(name: str, values: np.ndarray, good: np.ndarray, remedy: str) -> list[
     bad, read = ~good & ~np.isnan(values), np.count_nonzero(~np.isnan(values))
     if bad.sum() <= LEFT_MOST * read:
         return []
-    return [f"'{name}': {bad.sum()} of {read} cells cannot be and are left out, e.g. {values[bad][0]:.6g}; {remedy}"]
+    first = f"{values[bad][0]:.6g}" if np.isfinite(values[bad][0]) else "no finite number"
+    return [f"'{name}': {bad.sum()} of {read} cells cannot be and are left out, e.g. {first}; {remedy}"]
 
 
 def _period(rows: Observations) -> float:
@@ -147,7 +155,19 @@ def _motions(rows: Observations, base: BaseTable) -> list[str]:
     if carried.any():
         text = f"the robot was carried in {carried.sum()} rows, first row {carried.argmax() + 1}"
         lines += [f"{text}: it may be anywhere then; give it a pose, or let it drive"]
-    return lines
+    return lines or [*_ways(rows.odometry[moved])]
+
+
+def _ways(moved: np.ndarray) -> Iterator[str]:
+    """Of rows (n, 3) that the base can have driven each by itself."""
+    ahead, side, turn = moved.T
+    for name, values in zip(ODOMETRY[::2], (ahead, turn), strict=True):
+        if len(values) >= CONSTANT_LEAST and np.ptp(values) == 0.0:
+            yield f"'{name}' is {values[0]:.6g} in all of {len(values)} rows in which the robot moves; look at the odometry"
+    slid = np.abs(side - ahead * np.tan(0.5 * turn)).sum()  # beside the chord of an arc
+    if slid > SLACK_M + SIDEWAYS_MOST * np.abs(ahead).sum():
+        cause = "(are x and y exchanged, or in the map's frame?)"
+        yield f"'{ODOMETRY[1]}' sums to {slid:.3g} m sideways, which wheels do not go {cause}; give motion ahead and to the left"
 
 
 def _distances(whisker: Whisker, values: np.ndarray, sigma: float, moved: np.ndarray) -> Iterator[str]:
@@ -186,7 +206,8 @@ def _windows(name: str, values: np.ndarray) -> Iterator[str]:
     some = values[good]
     if not len(some) or np.ptp(some[0]) == 0.0:
         return
-    if (some >= 0.0).all() and np.allclose(some.sum(axis=1), 1.0, atol=1e-3):
-        yield f"'{name}' sum to 1 (are these probabilities?); give their logarithms"
+    for whole in (1.0, 100.0):
+        if (some >= 0.0).all() and np.allclose(some.sum(axis=1), whole, rtol=1e-3):
+            yield f"'{name}' sum to {whole:g} (are these probabilities?); give their logarithms"
     if (some == some[0]).all() and ACCURACY ** len(some) < CHANCE:
         yield f"'{name}' are the same in all of {len(some)} windows; look at the sensor, or leave the cells empty"

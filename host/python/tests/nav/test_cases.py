@@ -107,6 +107,12 @@ def summed(folder):
     cells(change)(folder)
 
 
+def in_the_maps_frame(row):
+    x, y, heading = (float(row[name]) for name in ("odo_x_m", "odo_y_m", "true_theta_rad"))
+    c, s = math.cos(heading), math.sin(heading)
+    return {"odo_x_m": repr(c * x - s * y), "odo_y_m": repr(s * x + c * y)}
+
+
 def obstacle(low, high):
     return whole("arena.toml", lambda data: data + f"\n[[obstacle]]\nmin_m = {low}\nmax_m = {high}\n".encode())
 
@@ -147,6 +153,10 @@ OF_SCENES = {
     "degrees": (factor("odo_theta_rad", 57.29578), r"'odo_theta_rad': .* \(are these degrees"),
     "odo_of_words": (cells(lambda n, row: row.update(odo_theta_rad="left")), "'odo_theta_rad': 100% of the rows are no number"),
     "odo_of_zeros": (factor("odo_.*", 0.0), "'object1_mm' changes, and the odometry is 0 in every row"),
+    "odo_x_and_y_exchanged": (cells(lambda n, row: row.update(odo_x_m=row["odo_y_m"], odo_y_m=row["odo_x_m"])), r"'odo_y_m' sums to .* sideways, .*\(are x and y exchanged"),
+    "odo_in_the_maps_frame": (cells(lambda n, row: row.update(in_the_maps_frame(row))), r"'odo_y_m' sums to .* or in the map's frame"),
+    "odo_frozen": (cells(lambda n, row: row.update(odo_x_m="0.013", odo_y_m="0", odo_theta_rad="0.02")), "'odo_x_m' is 0.013 in all of 300 rows"),
+    "never_turns": (factor("odo_theta_rad", 0.0), "'odo_theta_rad' is 0 in all of"),
     "odo_garbage": (motion(x_m="1.0001644e+256", y_m="4.687e-54"), r"row 151 moves by 1e\+256"),
     "odo_nan_one": (motion(x_m="nan", y_m="nan", theta_rad="nan"), "row 151 moves by nan"),
     "odo_reset_jump": (motion(x_m="-1.7", y_m="0.4", theta_rad="0.9"), "row 151 moves by -1.7, 0.4, 0.9.* 1 left out"),
@@ -158,14 +168,16 @@ OF_SCENES = {
     "some_zero": (distances(lambda cell, n: cell or ("" if n % 8 else "0")), "'object1_mm' is 0 in"),
     "minus1_for_no_contact": (no_contact("-1"), "'object1_mm': 239 of 300 cells cannot be .*-1; .*likewise object2_mm"),
     "9999_for_no_contact": (no_contact("9999"), "'object1_mm': 239 of 300 cells cannot be .*9999"),
-    "words": (no_contact("none"), "'object1_mm': 239 of 300 cells cannot be"),
+    "words": (no_contact("none"), "'object1_mm': 239 of 300 cells cannot be .* e.g. no finite number"),
     "metres_not_mm": (factor("object._mm", 0.001), r"'object1_mm' is at most 0.136 .*\(are these cm or m\?"),
+    "twins": (cells(lambda n, row: row.update(object2_mm=row["object1_mm"])), "'object2_mm' is that of object1 in every row"),
     "tenths_of_mm": (factor("object._mm", 10.0), r"'object1_mm': .*\(are these 0.1 mm"),
     "micrometres": (factor("object._mm", 1000.0), r"'object1_mm': .*\(are these um"),
     "saturated": (distances(lambda cell, _: cell and repr(max(float(cell), 80.0))), "'object1_mm' is 80 in"),
     "stuck": (distances(lambda cell, _: "88"), "'object1_mm' is 88 in .* look at the sensor"),
     # windows
     "prob_not_log": (cells(probabilities), "'floor1_TEXTURE' sum to 1 .are these probabilities"),
+    "percent": (cells(lambda n, row: row.update({k: str(100 * np.exp(float(v))) for k, v in row.items() if k[:5] == "floor" and v})), "'floor1_TEXTURE' sum to 100 .are these probabilities"),
     "one_window": (cells(lambda n, row: row.update(floor1_VINYL="-9", floor1_SMOOTH="-8", floor1_ROUGH="-1")), "'floor1_.* the same in all of 300"),
     "windows_of_nan": (cells(lambda n, row: row.update(floor1_VINYL="nan")), "'floor1_TEXTURE': 300 of 300 cells"),
     "nothing_read": (cells(lambda n, row: row.update({c: "" if c[0] == "f" else "nan" for c in row if c[:5] in ("floor", "objec")})), "no row has a reading"),
@@ -183,6 +195,7 @@ OF_SCENES = {
     "quoted": (lines(lambda _, line: b'"' + line.replace(b",", b'","') + b'"'), RIGHT),
     "header_only": (whole(ROW, lambda data: data.splitlines()[0] + b"\n"), "! no rows; record some"),
     "empty": (whole(ROW, lambda data: b""), "! line 1: no header line; name"),
+    "no_header": (whole(ROW, lambda data: data.partition(b"\n")[2]), "! line 1: no header line; name"),
     "only_comments": (whole(ROW, lambda data: b"# nothing\n# yet\n"), "! line 1: no header line; name"),
     "dup_col": (lines(lambda _, line: line + b"," + line.split(b",")[4]), "! line 1: column 'floor1_VINYL' appears twice; keep"),
     "semicolon": (whole(ROW, lambda data: data.replace(b",", b";")), "! line 1: cells are separated by ';'; separate"),
