@@ -1,6 +1,7 @@
 """The socket that clients connect to, with a lock beside it, as whisker-base has them: one driver for each path."""
 
 import contextlib
+import errno
 import fcntl
 import os
 import socket
@@ -32,9 +33,12 @@ def listening(path: Path) -> Iterator[tuple[socket.socket, int]]:
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as made:
             _bind(made, path)
+            own = os.lstat(path)
             made.listen(BACKLOG)
             yield made, lock
-            path.unlink(missing_ok=True)
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.lstat(path), own):
+                    path.unlink()
     finally:
         lock_path.unlink(missing_ok=True)
         os.close(lock)
@@ -69,5 +73,6 @@ def _bind(made: socket.socket, path: Path) -> None:
 
 
 def _is_left(path: Path) -> bool:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as probe:
-        return probe.connect_ex(str(path)) != 0
+    """Whether it is the socket of a process that has ended: one that is full, or another user's, is not."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK) as probe:
+        return probe.connect_ex(str(path)) == errno.ECONNREFUSED

@@ -8,6 +8,7 @@ from crunchbot.base_table import BaseTable
 from crunchbot.pilot.base import BUMP_LEFT, IDLE
 from crunchbot.robot.rosbase.clients import CLIENTS_MOST, Clients
 from crunchbot.robot.rosbase.drive import Drive
+from crunchbot.robot.rosbase.listening import SocketError, listening
 
 FOR_EVER = float("inf")
 STEP = {"distance": 0.25, "scale_distance": 0.01}
@@ -119,3 +120,23 @@ def test_nobody_drives_a_base_that_is_not_to_be_driven(tmp_path):
     client = driver.connect()
     assert driver.ask(client, "drive 0.2 0") == "error nobody has seen it stop; look" and not driver.drive.driving
     assert driver.ask(client, "stop").startswith("sent 0")
+
+
+def test_nothing_at_its_path_is_removed_but_what_is_its_own_or_left(tmp_path):
+    path = tmp_path / "base.sock"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as full:
+        full.bind(str(path))
+        full.listen(0)
+        waiting = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        waiting.connect(str(path))  # nobody takes it: there is no place for another
+        with pytest.raises(SocketError), listening(path):
+            raise AssertionError("it is taken from one that lives")
+        waiting.close()
+    with listening(path):
+        path.unlink()
+        path.write_text("a person's")
+    assert path.read_text() == "a person's"
+    path.unlink()
+    with listening(path):
+        assert path.is_socket()
+    assert list(tmp_path.iterdir()) == []
