@@ -10,10 +10,13 @@ from pathlib import Path
 import numpy as np
 from models import LENGTH, model
 from mutate import mutate
+from PIL import Image
 
 from crunchbot.errors import UserError
 from crunchbot.nav.observations import read_observations
+from crunchbot.occupancy import read_map
 from crunchbot.scene import Scene, load, write
+from crunchbot.touch.calibration import Rest, read_noise, write_rest
 from crunchbot.touch.radial import model as radial
 from crunchbot.touch.texture import model as texture
 from crunchbot_lab import scenes
@@ -52,10 +55,12 @@ PIECES = (
     b"\n",
     b"=",
     b"nan",
+    b"inf",
     b"[" * 5000,
     b"\xef\xbb\xbf",
     b"\0",
 )
+MAP = b"image: map.{}\nresolution: 0.05\norigin: [1.0, -2.0, 0.5]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\nmode: scale\n"
 SAMPLES = np.random.default_rng(1).normal(32768.0, 30.0, (4 * LENGTH, 2))
 
 
@@ -138,6 +143,13 @@ def seeds(folder: Path, made: Scene) -> list[tuple]:
     readers |= {"faults.toml": lambda path: read_faults(path, 2000)}
     readers |= {"texture.json": report_texture, "plain.json": report_texture}
     readers |= {"radial.json": report_radius, "curve.json": report_radius}
+    drawn = Image.fromarray(np.random.default_rng(2).choice([0, 205, 254], (20, 30)).astype(np.uint8))
+    for kind in ("pgm", "png"):
+        drawn.save(folder / f"map.{kind}")
+        (folder / f"{kind}.yaml").write_bytes(MAP.replace(b"{}", kind.encode()))
+        readers |= dict.fromkeys((f"map.{kind}", f"{kind}.yaml"), lambda _, kind=kind: read_map(folder / f"{kind}.yaml"))
+    write_rest(folder / "rest.toml", [Rest(3, np.ones(2), np.ones(2), 9, 1)], [f"lane{n}" for n in range(28)])
+    readers["rest.toml"] = read_noise
     return [(folder / name, (folder / name).read_bytes(), read) for name, read in readers.items()]
 
 

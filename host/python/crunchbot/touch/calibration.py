@@ -131,7 +131,7 @@ def read_noise(path: Path) -> dict[int, np.ndarray]:
         lanes = {int(entry["lane"]): np.asarray(entry["noise"], float) for entry in content["lane"]}
         if any(noise.shape != (2,) or not (noise >= 0.0).all() for noise in lanes.values()):
             raise ValueError("noise is not two numbers")
-    except (UnreadableError, KeyError, TypeError, ValueError) as error:
+    except (UnreadableError, LookupError, TypeError, ValueError, OverflowError) as error:
         raise RestError(f"{path}: {error}; give the rest.toml that whisker calibrate wrote") from error
     return lanes
 
