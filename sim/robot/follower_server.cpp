@@ -32,6 +32,18 @@ sockaddr_un address_of(const std::string &path)
     return address;
 }
 
+// Whether a socket of a program that has ended is there; one that lives refuses nobody, and no file is one.
+bool is_left(const sockaddr_un &address)
+{
+    struct stat there;
+    const int probe = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    const bool left = lstat(address.sun_path, &there) == 0 && S_ISSOCK(there.st_mode) &&
+                      connect(probe, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 &&
+                      errno == ECONNREFUSED;
+    close(probe);
+    return left;
+}
+
 } // namespace
 
 FollowerServer::FollowerServer(const std::string &path, unsigned expected, Answer answer)
@@ -42,12 +54,11 @@ FollowerServer::FollowerServer(const std::string &path, unsigned expected, Answe
     }
     const sockaddr_un address = address_of(path);
     listener_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    struct stat there;
-    if (lstat(path.c_str(), &there) == 0 && S_ISSOCK(there.st_mode)) {
-        unlink(path.c_str()); // one that an earlier simulation has left; nothing else is removed
+    if (is_left(address)) {
+        unlink(path.c_str());
     }
     if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 ||
-        listen(listener_, BACKLOG) != 0) {
+        lstat(path.c_str(), &made_) != 0 || listen(listener_, BACKLOG) != 0) {
         const std::string reason = std::strerror(errno);
         throw std::runtime_error("--socket: cannot listen at '" + path + "': " + reason);
     }
@@ -60,7 +71,10 @@ FollowerServer::~FollowerServer()
     }
     if (listener_ >= 0) {
         close(listener_);
-        unlink(path_.c_str());
+        struct stat there;
+        if (lstat(path_.c_str(), &there) == 0 && there.st_dev == made_.st_dev && there.st_ino == made_.st_ino) {
+            unlink(path_.c_str()); // what another has put there since stays
+        }
     }
 }
 

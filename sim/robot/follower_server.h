@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <poll.h>
+#include <sys/stat.h>
 
 #include "pilot_answers.h"
 extern "C" {
@@ -97,6 +98,8 @@ class FollowerServer
     unsigned expected_;
     PilotAnswers answers_;
     int listener_ = -1;
+    struct stat made_ {
+    }; // the socket, to know it again
     std::vector<Follower> followers_;
     std::deque<Cable> cable_;
     std::deque<LaneChange> lane_changes_;

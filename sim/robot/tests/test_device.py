@@ -115,6 +115,22 @@ def test_command_that_ends_too_soon_is_an_error(tmp_path):
     assert result.stderr == "whisker-bridge-sim: the run ended after 0 of 2000 ticks\n"
 
 
+def test_a_socket_at_which_somebody_listens_is_not_taken(tmp_path):
+    path = tmp_path / "sock"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as other:
+        other.bind(str(path))
+        other.listen()
+        (tmp_path / "first").mkdir()
+        words = command(tmp_path / "first", 1, 1, ["true"], "--socket", path)
+        result = subprocess.run(words, capture_output=True, text=True, timeout=TIMEOUT_S)
+        assert result.returncode == 1 and f"cannot listen at '{path}': Address already in use" in result.stderr
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as client:
+            client.connect(str(path))
+    client = ["sh", "-c", f"rm {path} && echo mine > {path}"]
+    subprocess.run(command(tmp_path, 1, 1, client, "--socket", path), capture_output=True, timeout=TIMEOUT_S)
+    assert path.read_text() == "mine\n", "the socket of one that has ended is taken over, what came since stays"
+
+
 def test_command_is_killed_with_the_simulation(tmp_path):
     mark = tmp_path / "pid"
     client = ["sh", "-c", f"echo $$ > {mark}.tmp && mv {mark}.tmp {mark} && exec sleep 1000"]

@@ -8,6 +8,7 @@ import subprocess
 import time
 
 import pytest
+from patience import PATIENCE_S
 
 from crunchbot.pilot.base import BUMP_LEFT, CLIFF_FRONT_LEFT, IDLE, Base
 from crunchbot.programs import program
@@ -174,3 +175,16 @@ def test_a_low_battery_is_reported(robot):
     assert it.base.health()["low_battery"] == "1"
     it.close()
     assert "the battery is low" in it.log
+
+
+def test_the_emulator_takes_the_place_of_no_link_but_an_emulators(tmp_path):
+    link, words = tmp_path / "port", [program("whisker-create-sim"), "--link", tmp_path / "port"]
+    link.symlink_to(tmp_path / "data")
+    done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S)
+    assert done.returncode != 0 and "File exists" in done.stderr and link.readlink() == tmp_path / "data"
+    link.unlink()
+    link.symlink_to("/dev/pts/987654")
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as emulator:
+        assert str(link) in emulator.stdout.readline()
+        emulator.terminate()
+    assert not link.is_symlink()
