@@ -5,10 +5,13 @@ import sys
 
 import fuzz
 import pytest
+from patience import PATIENCE_S
 
 
 def run(*arguments):
-    return subprocess.run([sys.executable, fuzz.__file__, *arguments], capture_output=True, text=True, timeout=60)
+    return subprocess.run(
+        [sys.executable, fuzz.__file__, *arguments], capture_output=True, text=True, timeout=PATIENCE_S
+    )
 
 
 @pytest.mark.parametrize("target", sorted(fuzz.TARGETS))

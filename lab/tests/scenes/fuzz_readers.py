@@ -147,7 +147,9 @@ def seeds(folder: Path, made: Scene) -> list[tuple]:
     for kind in ("pgm", "png"):
         drawn.save(folder / f"map.{kind}")
         (folder / f"{kind}.yaml").write_bytes(MAP.replace(b"{}", kind.encode()))
-        readers |= dict.fromkeys((f"map.{kind}", f"{kind}.yaml"), lambda _, kind=kind: read_map(folder / f"{kind}.yaml"))
+        readers |= dict.fromkeys(
+            (f"map.{kind}", f"{kind}.yaml"), lambda _, kind=kind: read_map(folder / f"{kind}.yaml")
+        )
     write_rest(folder / "rest.toml", [Rest(3, np.ones(2), np.ones(2), 9, 1)], [f"lane{n}" for n in range(28)])
     readers["rest.toml"] = read_noise
     return [(folder / name, (folder / name).read_bytes(), read) for name, read in readers.items()]

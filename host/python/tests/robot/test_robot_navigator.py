@@ -306,7 +306,7 @@ def test_a_row_that_cannot_be_is_refused_and_the_pose_is_as_without_it(made, kin
 
 
 @pytest.mark.parametrize("mapped", [True, False])
-def test_answers_on_ground_that_nobody_mapped_are_told_as_of_a_file(made, monkeypatch, mapped):
+def test_answers_on_ground_that_nobody_mapped_are_reported_as_of_a_file(made, monkeypatch, mapped):
     monkeypatch.setattr("crunchbot.robot.row_watch.ROWS", ROWS)
     _, scene, rows = made
     unknown = () if mapped else ((0.0, 0.0, *scene.arena.size_m),)
@@ -318,9 +318,9 @@ def test_answers_on_ground_that_nobody_mapped_are_told_as_of_a_file(made, monkey
         inside.run()
         got = take_until(inside.inbox, _all_over, PATIENCE_S)
     poses = [r.message.pose.pose.xytheta for r in got if r.topic == "localisation" and not r.over]
-    told = ground_faults(np.array(poses), scene)
+    given = ground_faults(np.array(poses), scene)
     health_reported = [r.message for r in got if r.topic == "health/navigator" and not r.over][-1]
-    assert len(told) != mapped and health_reported.last_error == "".join(f"rows: {line}" for line in told)
+    assert len(given) != mapped and health_reported.last_error == "".join(f"rows: {line}" for line in given)
 
 
 def test_rows_of_another_robot_are_refused_by_name_and_the_navigator_stays(made):
