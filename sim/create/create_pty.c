@@ -32,7 +32,8 @@ static int create_pty_open_both(struct create_pty *pty)
 
 static int create_pty_make_link(struct create_pty *pty, const char *link, char *error, size_t size)
 {
-    static const char TERMINALS[] = "/dev/pts/"; /* where the link of an earlier emulator leads; any other is a person's */
+    static const char TERMINALS[] =
+        "/dev/pts/"; /* where the link of an earlier emulator leads; any other is a person's */
     char target[sizeof TERMINALS] = "";
     if (strlen(link) >= sizeof pty->link) {
         errno = ENAMETOOLONG;
