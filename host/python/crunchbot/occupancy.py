@@ -95,10 +95,14 @@ def _parsed(path: Path) -> object:
     if len(text) > TEXT_MOST:
         raise UnreadableError(f"more than {TEXT_MOST >> 10} KiB")
     try:
-        return yaml.safe_load(text)
+        read, node = yaml.safe_load(text), yaml.compose(text, yaml.SafeLoader)
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         place = getattr(error, "problem_mark", None)
         raise UnreadableError(f"not YAML{f' (line {place.line + 1})' if place else ''}") from error
+    fields = [key.value for key, _ in node.value] if isinstance(node, yaml.MappingNode) else []
+    if twice := next((name for name in fields if fields.count(name) > 1), None):
+        raise UnreadableError(f"field '{twice}' appears twice; keep one")
+    return read
 
 
 def cells_of(grey: Grey, mode: str, negate: bool, free: float, occupied: float) -> np.ndarray:

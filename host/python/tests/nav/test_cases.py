@@ -420,6 +420,7 @@ OF_MAPS = {
     "raw_unknown": (both(image(np.where(np.indices(WALL.shape)[1] > 55, 255, grey(100, 0)).astype(np.uint8)), RAW), OTHER_WORLD),
     "half_unknown": (both(image(np.where(np.indices(WALL.shape)[1] > 29, 255, grey(100, 0)).astype(np.uint8)), RAW), "% of the rows are on ground that nobody mapped, .*; map it"),
     "raw100": (both(image(grey(255, 0)), RAW), "no cell is solid: 86% free, 0% solid, 14% unknown by mode raw"),
+    "res_twice": (whole("ok.yaml", lambda data: data + b"resolution: 0.1\n"), "! 'resolution' appears twice; keep one"),
     "res0": (yaml("0.05", "0.0"), "! 'resolution' must be a number from 0.0001 .*not 0.0; "),
     "resstr": (yaml("0.05", '"0.05"'), "! 'resolution' must be a number .*not '0.05'; "),
     "rescm": (yaml("0.05", "5"), "'resolution' makes a pixel 5 m wide, the robot is 0.21, and the map 300 x 200 m; give"),
