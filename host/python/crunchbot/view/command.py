@@ -132,7 +132,8 @@ async def _serve(arguments: argparse.Namespace, hub: Hub, part: str) -> int:
     listen(end)
     async with serving(hub, arguments.host, arguments.port, arguments.allow_host) as port:
         address = ipaddress.ip_address(arguments.host)
-        warn_if_open("whisker-view", arguments.host, "watch")
+        may = ["watch", *["set the pose, stop the robot"] * hub.may_set_pose, *["record"] * bool(hub.recorder)]
+        warn_if_open("whisker-view", arguments.host, ", ".join(may))
         host = "127.0.0.1" if address.is_unspecified else f"[{address}]" if address.version == 6 else str(address)
         url = f"http://{host}:{port}/{part}"
         print(url, flush=True)

@@ -426,3 +426,15 @@ def test_the_program_serves_prints_its_address_and_ends_at_sigterm():
 
 def test_the_program_states_its_version(capsys):
     assert main(["--version"]) == 0 and capsys.readouterr().out == f"whisker-view {__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "what"), [([], "watch"), (["--allow-pose", "--robot", "r"], "watch, set the pose, stop the robot, record")]
+)
+def test_a_view_that_is_open_says_what_others_may(more, what):
+    words = [sys.executable, "-m", "crunchbot.view", "--host", "0.0.0.0", "--port", "0", *more]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline().startswith("http://127.0.0.1:")
+        process.terminate()
+        given = process.stderr.read()
+    assert given == f"whisker-view: 0.0.0.0: anyone who reaches this address can {what}\n"
