@@ -16,7 +16,7 @@ EXAMPLE = "whisker scene make --family anchor+kidnap --seed 7 --out scenes/7"
 def add(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     p = add_action(actions, "make", "draw a scene of a family, observations and truth included", EXAMPLE, make)
-    p.add_argument("--family", metavar="F", help="a base and any modifiers, joined by '+'; see --list-families")
+    p.add_argument("--family", metavar="F", help="joined by '+': see --list-families").values = list(scenes.BASES)
     p.add_argument("--seed", type=whole_number(0), default=0, metavar="N", help="draws arena, path and noise")
     p.add_argument("--steps", type=whole_number(1), metavar="N", help="rows of 0.1 s (default: the family's)")
     add_output(p, "--out", own=HELD, metavar="DIR", help="folder to write")

@@ -26,7 +26,7 @@ from ..touch.texture.drive import INSIDE_M, Drive, Stretch, over_tiles, stated, 
 from ..touch.texture.lacking import lacking
 from ..touch.texture.spectral import HAZARD, HAZARD_LEAST
 
-METHODS = "spectra, calibrated on recordings held out (default: default), or naive-bayes: the paper's equation 1"
+METHODS = "naive-bayes: the paper's equation 1 (default: spectra, calibrated on recordings held out)"
 SPAN = re.compile(r"(?P<name>[^=/]+)(=(?P<first>[\d.]+)-(?P<last>[\d.]+))?")
 EXAMPLE = "whisker texture train examples/surfaces --out model.json"
 
