@@ -5,6 +5,9 @@ Of their own: messages, rows, checkpoints, recordings, what pages and robots say
 """
 
 import json
+import os
+import socket
+import struct
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +18,7 @@ import numpy as np
 from mutate import mutate
 from robotkit import examples
 
+from crunchbot.base_table import BaseTable
 from crunchbot.bridge.nodes import read_nodes
 from crunchbot.errors import UserError
 from crunchbot.guard import Guard
@@ -25,6 +29,9 @@ from crunchbot.robot.network import messages as m
 from crunchbot.robot.network.link import read_config
 from crunchbot.robot.network.streams import Envelope, EnvelopeError, envelopes
 from crunchbot.robot.processes.logs import last_line
+from crunchbot.robot.processes.watchdog import Watchdog
+from crunchbot.robot.rosbase.clients import Client, Clients
+from crunchbot.robot.rosbase.drive import Drive
 from crunchbot.robot.standard.outlet import Outlet
 
 FOLDER = Path(tempfile.mkdtemp(prefix="whisker-"))
@@ -69,6 +76,25 @@ def answered(ask: Callable[[Base], object]) -> Callable[[bytes], object]:
     return use
 
 
+def ordered() -> Callable[[bytes], object]:
+    """What the driver of a base that speaks ROS 2 answers to a client."""
+    drive = Drive(BaseTable(0.25, 0.5), lambda v, omega: True, lambda line: None)
+    clients = Clients(socket.socketpair()[0], drive, lambda: 0, lambda: {"model": "ros2"}, "")
+    client = Client(socket.socketpair()[0], 0.0)
+
+    def use(data: bytes) -> None:
+        answer = clients._answer(client, data)
+        assert answer.split(" ")[0] in ("sent", "odometry", "health", "error") and "\n" not in answer, answer
+
+    return use
+
+
+def watched() -> Callable[[bytes], object]:
+    credentials = (socket.SOL_SOCKET, socket.SCM_CREDENTIALS, struct.pack("3i", 1, os.getuid(), 1))
+    watchdog = Watchdog()
+    return lambda data: watchdog._hear(data, [credentials])
+
+
 def of_file(read: Callable[[Path], object]) -> Callable[[bytes], object]:
     def use(data: bytes) -> object:
         (FOLDER / "file").write_bytes(data)
@@ -94,6 +120,8 @@ DOORS: dict[str, tuple[bytes, Callable[[bytes], object], tuple[type[Exception], 
     "health of the base": (b"health mode=safe frames=12", answered(Base.health), (UserError,)),
     "list of nodes": (b"   3     17     1.0\nlane 4: serial 12,\n", of_file(read_nodes), (UserError,)),
     "configuration of zenoh": (b'{mode: "peer", connect: {endpoints: []}}', of_file(read_config), (UserError,)),
+    "orders to a base of ROS 2": (b"drive 0.2 -0.5", ordered(), ()),
+    "what is reported to a watchdog": (b"READY=1\nSTATUS=x\nWATCHDOG=1", watched(), ()),
     "log of a process": (b"2026-01-01 00:00:00.000 a line\nprogress 1 2\n", of_file(last_line), ()),
 }
 
