@@ -37,6 +37,7 @@ MAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "tools/benches mechanics": (("mechanics",), ()),
     "tools/benches nav": (("nav_matrix", "nav_pareto"), ("nav_pareto",)),
     "tools/benches nav_families": (("nav_families",), ()),
+    "tools/benches nav_worth": (("nav_worth",), ()),
     "tools/benches nav_peers": (("nav_peers",), ()),
     "tools/benches node": (("node", "node_cuts", "node_faults"), ()),
     "tools/benches pico": (("pico",), ()),

@@ -4,6 +4,7 @@ from crunchbot.nav import localise
 
 from ..store import read_result
 from ..tables import lined, named, table
+from .families import against
 from .judge import FIGURES
 
 OURS = localise.default_filter()
@@ -42,6 +43,12 @@ def families() -> str:
     """The default filter on all families of each group, and on all."""
     rows = named(read_result("nav_families")["families"], "family")
     return lined([row for row in rows if row["family"].startswith("all")], {"families": "{family}"} | FIGURES)
+
+
+def worth() -> str:
+    """What the default filter is without each mechanism, less what it is with it."""
+    found = read_result("nav_worth")["settings"]
+    return against({setting: parts["all"] for setting, parts in found.items()}).replace("family", "setting", 1)
 
 
 WANTED_MM = {"anchor": 20, "robot": 35, "raw": 45, "noisy": 80}

@@ -1,0 +1,98 @@
+"""What each of several settings is worth: all of them are switched at once, each in half of the runs of every draw.
+
+    tools/benches nav_worth --runs 430 --data DIR                                     the mechanisms that can be left out
+    tools/benches nav_worth --switch trust.learn=0 --switch texture.repeat=0          these two
+
+On each draw as many states run as a Hadamard matrix has rows; a setting's worth is what the states that have it differ by
+from those that do not, so that every run tells of every setting: for seven of them a quarter of the runs that one after
+the other would take. The second half of the draws runs the opposite states: then no pair of settings that matter together
+is taken for a third one. Draws, journal and --data: as of nav_families.
+"""
+
+import argparse
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from .. import store
+from .families import RECORDINGS, against, measure, parent_commit
+from .judge import COMPARED
+from .states import stated
+from .worlds import Family, all_families
+
+MOST = 7  # settings: eight states a draw
+SWITCHES = ("trust.learn=0", "texture.repeat=0", "motion.gaps=0")
+
+
+def hadamard(settings: int) -> np.ndarray:
+    """(states, settings) of +-1, a column a setting, each orthogonal to the others and to a constant; the first row is 1."""
+    matrix = np.ones((1, 1), int)
+    while matrix.shape[1] <= settings:
+        matrix = np.block([[matrix, matrix], [matrix, -matrix]])
+    return matrix[:, 1 : settings + 1]
+
+
+def worth(draws: Sequence[list[dict]], has: Sequence[np.ndarray]) -> dict[str, list[float]]:
+    """Of one setting: mean over draws of what states that have it differ by, standard error, and number of draws that tell.
+    has[n]: (states,) +1 where the states of draw n have it."""
+    out = {}
+    for name, value in COMPARED.items():
+        off = []
+        for states, sign in zip(draws, has, strict=True):
+            given = np.array([np.nan if (v := value(state)) is None else v for state in states])
+            on, without = given[sign > 0], given[sign < 0]
+            if np.isfinite(on).any() and np.isfinite(without).any():
+                off.append(np.nanmean(on) - np.nanmean(without))
+        error = float(np.std(off, ddof=1) / math.sqrt(len(off))) if len(off) > 1 else math.nan
+        out[name] = [float(np.mean(off)) if off else math.nan, error, len(off)]
+    return out
+
+
+def by_part(
+    families: dict[str, Family], found: Sequence[tuple[str, list[dict], np.ndarray]], settings: Sequence[str]
+) -> dict:
+    """By setting, then by group and over all. found: of each draw its family, its states' figures, and the matrix."""
+    parts: dict[str, list] = {}
+    for name, states, signs in found:
+        for part in (f"all of '{families[name].group}'", "all"):
+            parts.setdefault(part, []).append((states, signs))
+    return {
+        setting: {
+            part: {"against": worth([states for states, _ in draws], [signs[:, n] for _, signs in draws])}
+            for part, draws in parts.items()
+        }
+        for n, setting in enumerate(settings)
+    }
+
+
+def run(_build: Path, switch: Sequence[str], state: str, runs: int, data: Path | None, parent: str | None) -> None:
+    switch = switch or SWITCHES
+    if len(switch) > MOST:
+        raise SystemExit(f"--switch: {len(switch)} settings; give {MOST} at most")
+    if data is None and RECORDINGS in os.environ:
+        data = Path(os.environ[RECORDINGS])
+    families, commit, found = all_families(data), parent or parent_commit(), []
+    for half, signs in enumerate((hadamard(len(switch)), -hadamard(len(switch)))):
+        words = [",".join(key for key, sign in zip(switch, row, strict=True) if sign > 0) for row in signs]
+        states = [stated(f"{state}:{one}") for one in words]
+        draws = measure(families, runs // 2, f"{commit} {half}", states)
+        found += [(name, one, signs) for name, each in draws.items() for one in each]
+    summary = by_part(families, found, switch)
+    for setting, parts in summary.items():
+        print(f"with {setting} less without it, +- two standard errors\n{against(parts)}")
+    store.write_result("nav_worth", {"draws_of": commit, "draws": len(found), "settings": summary})
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--switch", action="append", default=[], metavar="KEY=VALUE", help=f"up to {MOST} (default: {SWITCHES})"
+    )
+    parser.add_argument(
+        "--state", default=f"{store.ROOT}:adaptive", metavar="TREE:FILTER", help="(default: this tree's)"
+    )
+    parser.add_argument("--runs", type=int, default=430, help="draws of all families together (default: %(default)s)")
+    parser.add_argument("--data", type=Path, metavar="DIR", help=f"recordings of others; default: ${RECORDINGS}")
+    parser.add_argument("--parent", metavar="COMMIT", help="whose draws; default: the parent of what is measured")
