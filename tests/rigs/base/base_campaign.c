@@ -146,7 +146,7 @@ static unsigned measured[2], within[2], measured_clean, within_clean;
 
 static int64_t
     stands_ms; /* since when the log says that the wheels stand, and nothing else was ordered; 0: it does not */
-static int64_t mode_wrong_ms, in_mode_ms[4], wheels_wrong_ms, lied_ms, stray_ms, deafened_ms;
+static int64_t mode_wrong_ms, in_mode_ms[4], wheels_wrong_ms, lied_ms, stray_ms, deafened_ms, recalled_ms;
 static char why[300];
 static char logged[4000];
 
@@ -311,6 +311,7 @@ static void judge_recall(void)
     const unsigned baud = sim_create_baud(create);
     const bool unbroken = now_ms > to_robot_ms && now_ms > to_host_ms && now_ms > driver_ms && plugged;
     deafened_ms = deafened() && unbroken ? deafened_ms : now_ms;
+    recalled_ms = deafened() ? now_ms : recalled_ms;
     if (now_ms - deafened_ms > (baud <= likely ? RECALLED_MS : RECALLED_ANY_MS)) {
         blame("the base is left at %u baud", baud);
     }
@@ -392,10 +393,10 @@ static void judge_wheels(void)
 /* What the log says of the wheels is so, or it says soon that they may turn. */
 static void judge_log(void)
 {
-    const bool stood = !turning() || robot.speeds.left_mm_s != 0 || robot.speeds.right_mm_s != 0;
-    stands_ms = stood && stands_ms > 0 && turning() ? 0 : stands_ms;
+    const bool driven = robot.speeds.left_mm_s != 0 || robot.speeds.right_mm_s != 0;
+    stands_ms = driven ? 0 : stands_ms;
     const int64_t since_ms = heard_ms < stands_ms ? heard_ms : stands_ms;
-    if (!stood && stands_ms > 0 && now_ms - since_ms > BELIEVED_MS && now_ms > driver_ms + MARGIN_MS) {
+    if (turning() && stands_ms > 0 && now_ms - since_ms > BELIEVED_MS && now_ms > driver_ms + MARGIN_MS) {
         blame("the log says \"wheels stopped\", the base was heard %lld ms ago, and they turn",
               (long long)(now_ms - heard_ms));
     }
@@ -420,7 +421,7 @@ static int leg_ms(void);
 
 static void judge_recovery(void)
 {
-    if (now_ms < RECOVER_MS + BEGIN_MS || deafened()) {
+    if (now_ms < RECOVER_MS + BEGIN_MS || now_ms - recalled_ms < 2 * BELIEVED_MS) { /* it may be called back late */
         return;
     }
     if (base_robot_kept(&robot)) {
@@ -889,7 +890,7 @@ static void begin_draw(uint64_t number)
     spoilt_orders = lied_frames = 0;
     heard_ms = to_robot_ms = to_host_ms = driver_ms = order_ms = ordered_ms = 0;
     mode_wrong_ms = wheels_wrong_ms = lied_ms = stray_ms = 0;
-    stands_ms = 0;
+    stands_ms = recalled_ms = 0;
     deafened_ms = now_ms;
     memset(in_mode_ms, 0, sizeof in_mode_ms);
     active = 0;
