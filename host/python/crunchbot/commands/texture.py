@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from whisker_protocol import LANES, LIMITS
 
 from ..arguments import add_action, add_output, add_ring, lane_list, number_above, plain, warn
@@ -22,9 +24,10 @@ from ..stopping import stop_on_signals
 from ..tables import TableError
 from ..touch.texture import model as texture
 from ..touch.texture import train as texture_train
+from ..touch.texture.change import notice, windows_of
 from ..touch.texture.drive import INSIDE_M, Drive, Stretch, over_tiles, stated, write
 from ..touch.texture.lacking import lacking
-from ..touch.texture.spectral import HAZARD, HAZARD_LEAST
+from ..touch.texture.spectral import HAZARD, HAZARD_LEAST, SpectralModel
 
 METHODS = "naive-bayes: the paper's equation 1 (default: spectra, calibrated on recordings held out)"
 SPAN = re.compile(r"(?P<name>[^=/]+)(=(?P<first>[\d.]+)-(?P<last>[\d.]+))?")
@@ -106,6 +109,8 @@ def train(arguments: argparse.Namespace) -> int:
             ) as bar:
                 progress = lambda done, of: advance(bar, done, of)  # noqa: E731
                 model = texture_train.train(recordings, rate_hz, window_ms, progress, hazard)
+            every = [speed for some in files.values() for speed in texture.speeds(some)]
+            model.speed_m_s = (min(every), max(every)) if every else None
             model.columns = texture.channel_names(next(iter(files.values()))[0])
         else:
             model = texture.TextureModel.train(recordings)
@@ -231,7 +236,7 @@ def classify(arguments: argparse.Namespace) -> int:
     model = texture.load(arguments.model)
     if Path(arguments.recording).is_dir():
         return classify_folder(arguments, model, window_ms)
-    for decision in decisions(arguments, model, arguments.recording, window_ms):
+    for decision in decisions(arguments, model, [Path(arguments.recording)], window_ms):
         if arguments.json:
             print(json.dumps(plain(vars(decision))))
         else:
@@ -239,17 +244,25 @@ def classify(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def decisions(arguments: argparse.Namespace, model: Any, path: str | Path, window_ms: float) -> list:
-    """Classifies one recording; its faults are warned of."""
-    t_s, samples = texture.read_recording(path, getattr(model, "columns", None), warn)
-    if samples.shape[1] != model.channels:
-        text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"
-        raise TableError(path, 1, text)
-    for fault in texture.rate_faults(t_s, model.rate_hz) if hasattr(model, "rate_hz") else ():
-        warn(f"{path}: {fault}")
-    found = texture.classify(model, t_s, samples, window_ms, arguments.sequential)
-    if not found:
-        warn(f"{path}: {len(samples)} samples and no decision; give a longer recording, or a shorter --window-ms")
+def decisions(arguments: argparse.Namespace, model: Any, files: list[Path], window_ms: float) -> list:
+    """Classifies recordings of one whisker; their faults are warned of, and a whisker, mount or speed not the model's."""
+    found, windows = [], []
+    for path in files:
+        t_s, samples = texture.read_recording(path, getattr(model, "columns", None), warn)
+        if samples.shape[1] != model.channels:
+            text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"
+            raise TableError(path, 1, text)
+        for fault in texture.rate_faults(t_s, model.rate_hz) if hasattr(model, "rate_hz") else ():
+            warn(f"{path}: {fault}")
+        judged = texture.classify(model, t_s, samples, window_ms, arguments.sequential)
+        if not judged:
+            warn(f"{path}: {len(samples)} samples and no decision; give a longer recording, or a shorter --window-ms")
+        found += judged
+        windows += [windows_of(model, samples)] if isinstance(model, SpectralModel) else []
+    speeds = texture.speeds(files)
+    changed = notice(model, np.concatenate(windows), float(np.median(speeds)) if speeds else None) if windows else ""
+    if changed:
+        warn(f"{files[0] if len(files) == 1 else files[0].parent}: {changed}")
     return found
 
 
@@ -260,7 +273,7 @@ def classify_folder(arguments: argparse.Namespace, model: Any, window_ms: float)
         raise TableError(arguments.recording, None, "no surface folder; give one folder per surface, or one CSV file")
     answers = {}
     for name, some in progress_bar(files.items(), desc="classify", unit="surface", disable=None):
-        answers[name] = Counter(d.label for file in some for d in decisions(arguments, model, file, window_ms))
+        answers[name] = Counter(d.label for d in decisions(arguments, model, some, window_ms))
     columns = [*model.classes, "unknown"]
     for line in rows(answers, columns) if arguments.json else table(answers, columns):
         print(line)

@@ -101,6 +101,12 @@ class Pilot:
             columns += observation.normal(self.names[lane]) + observation.point(self.names[lane])
         return Layout(columns)
 
+    @property
+    def changed(self) -> str:
+        """A line where a floor whisker, its mount or its speed is not its model's; else empty."""
+        lines = (f"{self.names[n]}: {self.surfaces[n].changed}" for n in self.texture_lanes if self.surfaces[n].changed)
+        return next(lines, "")
+
     def block(self, first_tick: int, alpha: np.ndarray, beta: np.ndarray, status: np.ndarray) -> tuple[float, float]:
         """Decide on the 40 ticks from `first_tick`: arrays (40, lanes) of counts and status -> v in m/s, omega in rad/s."""
         lanes, good = len(self.names), np.asarray(status)[:, : len(self.names)] == 0

@@ -142,7 +142,7 @@ class LiveFlight:
         self._look_for_navigator()
         state = self.state
         self._last_error = self._last_error if state in (RUNNING, ORDERED) else state
-        self._health.report(self._stamp_ns, state, self._last_error)
+        self._health.report(self._stamp_ns, state, self._last_error or self._flight.pilot.changed)
 
     def _stop_for_another_writer(self) -> None:
         """A new whiskerd can be there before SILENCE_S has passed. The wheels must not turn on by samples of the old one."""

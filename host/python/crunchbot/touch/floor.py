@@ -1,14 +1,17 @@
 """What a floor whisker says of a window: by the paper's classifier, about a rest that is followed, or by the spectral one."""
 
+from collections import deque
 from typing import Any
 
 import numpy as np
 
+from .texture.change import notice
 from .texture.spectral import SpectralModel
 
 STEP_COUNTS = 16.0  # MLX90333: 12 bits of angle in a 16-bit word (data sheet, front page)
 LONGEST_SAMPLES = 10_000.0  # the rest is the mean of about the last 5 s of sweeping: the drift takes minutes
 WINDOW_SAMPLES = 200  # 100 ms
+CHANGE_WINDOWS = 64  # 6.4 s of sweeping, in which a robot meets several tiles
 WINDOW_LEAST_GOOD = 150  # fewer good samples than this are no window
 FIRST_SAMPLES = 2_000.0  # and at first the model's own, as if it had been seen for 1 s
 
@@ -51,6 +54,7 @@ class FloorWhisker:
         """Equation 1 for a window (n, 2) of good samples, by class."""
         return self.model.loglik(dithered(window, self._rng), rest=self.rest)
 
+    changed = ""  # a line where whisker, mount or speed are not the model's: this way never knows
     silent = False  # whether the last window had no evidence though its samples are good: this way never says so
 
     def look(self, window: np.ndarray) -> np.ndarray | None:
@@ -68,7 +72,10 @@ class SpectralFloorWhisker:
     def __init__(self, model: SpectralModel):
         self.model = model
         self.silent = False  # whether the last window had no evidence, as during a catch
+        self.changed = ""  # a line where whisker, mount or speed are not the model's
         self._stream = model.stream(WINDOW_SAMPLES)
+        self._known = model.novelty is not None and model.novelty.length == WINDOW_SAMPLES
+        self._windows: deque[np.ndarray] = deque(maxlen=CHANGE_WINDOWS)
 
     def follow(self, samples: np.ndarray) -> None:
         """Spectra are of differences: a drifting rest is not in them."""
@@ -78,7 +85,16 @@ class SpectralFloorWhisker:
         a surface never trained."""
         (found,) = self._stream.push(window)
         self.silent = found.confidence == 0.0
+        if not self.silent and np.isfinite(window).all():
+            self._windows.append(window)
+            self._notice()
         return found.loglik if not self.silent and found.novelty <= 1.0 else None
+
+    def _notice(self) -> None:
+        """Once, of whole batches of windows: what is changed is sought among many ways, which takes a while."""
+        if len(self._windows) == CHANGE_WINDOWS and not self.changed and self._known:
+            self.changed = notice(self.model, np.array(self._windows))
+            self._windows.clear()
 
     def pause(self) -> None:
         """The next window does not follow the last."""

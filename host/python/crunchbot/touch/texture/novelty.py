@@ -9,6 +9,7 @@ from .classifier import made, pointers
 
 ROW = lib.NAV_TEXTURE_ROW  # windows
 SHRINK = 0.3  # share of the diagonal in the covariance of windows within a row
+NORMAL_999 = 3.09  # quantile of the normal distribution
 RECORDINGS_PRIOR = 10.0  # recordings' worth of a spread alike in all directions, that the measured spread is mixed with
 
 
@@ -21,9 +22,10 @@ class Novelty:
     turn: np.ndarray  # (F, F)
     mean: np.ndarray  # (classes, F)
     row: np.ndarray  # (F,)
+    drive: float = 0.0  # limit of the mean over the rows of a drive, each over its own limit; 0: not known
 
     ARRAYS = {"limit": 1, "turn": 2, "mean": 2, "row": 1}  # and their dimensions
-    NUMBERS = ("length",)
+    NUMBERS = ("length", "drive")
 
     def native(self) -> ffi.CData:
         """A detector of its own, that has seen no window; ValueError when a size or number is impossible."""
@@ -98,6 +100,17 @@ def conformal(values: list[np.ndarray], level: float) -> float:
     weight = np.concatenate([np.full(len(v), 1.0 / len(v)) for v in values])[order]
     enough = np.cumsum(weight) >= (1.0 - level) * (len(values) + 1) - 1e-9
     return float(np.concatenate(values)[order[int(enough.argmax()) if enough.any() else -1]])
+
+
+def of_one_in_a_thousand(values: np.ndarray) -> float:
+    """What one of a thousand more is beyond, when logarithms of values (m,) are normal; 0 of fewer than three. Student's
+    quantile by the expansion of Cornish and Fisher."""
+    count, logs = len(values), np.log(values)
+    if count < 3:
+        return 0.0
+    z, freedom = NORMAL_999, count - 1
+    quantile = z + (z**3 + z) / (4.0 * freedom) + (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / (96.0 * freedom**2)
+    return float(np.exp(logs.mean() + quantile * logs.std(ddof=1) * np.sqrt(1.0 + 1.0 / count)))
 
 
 def least_level(recordings: int) -> float:

@@ -14,7 +14,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from .classifier import blocks_of, plain_features
 from .fit import Windows, fit, most_probable
 from .model import longest_run
-from .novelty import Rows, conformal, fit_novelty, least_level, limits
+from .novelty import Rows, conformal, fit_novelty, least_level, limits, of_one_in_a_thousand
 from .spectral import HAZARD, SENSOR_STOPS, Judgement, SpectralModel, forward
 
 FOLDS = 10  # or as many as there are recordings
@@ -132,7 +132,8 @@ class Learnt:
         made.doubt = min(DOUBT, -conformal(sure, REFUSE_DOUBT)) if sure else 0.0
         if self._distances is not None:
             limit = limits([self._distances[n] for n in kept], REFUSE_NOVEL)
-            made.novelty = replace(self._novelty[left_out], limit=limit)
+            far = np.array([np.mean([row[-1] / limit[len(row) - 1] for row in self._distances[n]]) for n in kept])
+            made.novelty = replace(self._novelty[left_out], limit=limit, drive=of_one_in_a_thousand(far))
         return made
 
     def _rows_of(self, length: int, kept: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float]:
