@@ -56,7 +56,7 @@ class MadeUpFlight:
     def __init__(self):
         self.took, self.interruptions, self.ticks_used = [], [], 0
         behaviour = SimpleNamespace(choices=None)
-        self.pilot = SimpleNamespace(bad_samples=0, whisks=[], behaviour=behaviour)
+        self.pilot = SimpleNamespace(bad_samples=0, whisks=[], behaviour=behaviour, changed="")
 
     def take(self, block):
         self.took.append(block[0])
@@ -218,6 +218,16 @@ def test_health_reports_of_navigator_and_base(live):
     assert (counters["navigator"], counters["navigator_lost"], counters["base_mode"]) == ("gone", 1, "safe")
     assert [health.state for health in live.link.reported][-2:] == ["no base", "ended"]
     assert live.link.reported[-1].last_error == "no base"
+
+
+def test_health_reports_a_whisker_that_is_not_its_models_behind_what_is_graver(live):
+    live.flight.pilot.changed = "floor_left: mount: turned"
+    live.ring.bring(0)
+    live.steps()
+    assert live.link.reported[-2].last_error == "floor_left: mount: turned"
+    live.base.trouble = "no base"
+    live.steps()
+    assert live.link.reported[-2].last_error == "no base"
 
 
 def test_the_end_stops_the_wheels_and_closes_the_base(live):
