@@ -146,7 +146,7 @@ static unsigned measured[2], within[2], measured_clean, within_clean;
 
 static int64_t
     stands_ms; /* since when the log says that the wheels stand, and nothing else was ordered; 0: it does not */
-static int64_t mode_wrong_ms, in_mode_ms[4], wheels_wrong_ms, lied_ms, stray_ms, deafened_ms, recalled_ms;
+static int64_t mode_wrong_ms, in_mode_ms[4], wheels_wrong_ms, lied_ms, stray_ms, deafened_ms, recalled_ms, stood_ms;
 static char why[300];
 static char logged[4000];
 
@@ -395,7 +395,8 @@ static void judge_log(void)
 {
     const bool driven = robot.speeds.left_mm_s != 0 || robot.speeds.right_mm_s != 0;
     stands_ms = driven ? 0 : stands_ms;
-    const int64_t since_ms = heard_ms < stands_ms ? heard_ms : stands_ms;
+    stood_ms = turning() ? stood_ms : now_ms;
+    const int64_t since_ms = heard_ms < stands_ms ? heard_ms : stands_ms > stood_ms ? stands_ms : stood_ms;
     if (turning() && stands_ms > 0 && now_ms - since_ms > BELIEVED_MS && now_ms > driver_ms + MARGIN_MS) {
         blame("the log says \"wheels stopped\", the base was heard %lld ms ago, and they turn",
               (long long)(now_ms - heard_ms));
@@ -890,7 +891,7 @@ static void begin_draw(uint64_t number)
     spoilt_orders = lied_frames = 0;
     heard_ms = to_robot_ms = to_host_ms = driver_ms = order_ms = ordered_ms = 0;
     mode_wrong_ms = wheels_wrong_ms = lied_ms = stray_ms = 0;
-    stands_ms = recalled_ms = 0;
+    stands_ms = recalled_ms = stood_ms = 0;
     deafened_ms = now_ms;
     memset(in_mode_ms, 0, sizeof in_mode_ms);
     active = 0;
