@@ -14,6 +14,9 @@ from matplotlib.figure import Figure
 from crunchbot.touch.radial import model as radial
 from crunchbot_lab.report.figures import SETTINGS
 from crunchbot_lab.scenes.sweep import sweep
+from crunchbot_lab.signals import pushes
+from crunchbot_lab.signals.mechanics import LEAD_S
+from crunchbot_lab.signals.world import TICK_S
 
 from .. import store
 from .trials import PAPER_MM, RADII_MM, SOURCES, SPOILS, SPREADS, Kind, Set, Whisker, recorded, spoilt
@@ -119,6 +122,33 @@ def stability() -> dict:
     return out
 
 
+def onsets() -> dict:
+    """Pushes that go wrong, in the test alone or in every third contact of calibration too: share of sure answers, their RMS and
+    worst error, mm."""
+    out = {}
+    for how in pushes.HOWS:
+        for each in (0, 3):
+            rows = []
+            for k, spread in enumerate(SPREADS):
+                for n in range(WHISKERS):
+                    rng, whisker = rng_of(40, k, n), Whisker.drawn(SEED + k, n)
+                    cal, held = (recorded(whisker, Kind(spread), r, rng) for r in (FIT, HELD))
+                    lead = int(LEAD_S / TICK_S)
+                    contacts = pushes.spoilt(cal.whisks.recorded, lead, how, rng, each)
+                    model = radial.PressModel.fit(contacts, cal.whisks.radius_mm)
+                    tests = pushes.spoilt(held.whisks.recorded, lead, how, rng)
+                    rows += [
+                        (t.confidence, t.radius_mm - r)
+                        for t, r in zip((radial.estimate(model, c) for c in tests), held.whisks.radius_mm, strict=True)
+                    ]
+            confidence, off = np.array(rows).T
+            sure = confidence > radial.PressModel.DOUBTED
+            found = {"n": len(rows), "sure": np.mean(sure), "rms_mm": rms(off[sure])}
+            found |= {"worst_mm": np.abs(off[sure]).max(), "beyond_10": int((np.abs(off[sure]) > 10.0).sum())}
+            out.setdefault(how, {})["both" if each else "test"] = found
+    return out
+
+
 def _stability_of(rows: list) -> dict:
     mm, sigma, _type, sure, truth = (np.array(v) for v in zip(*rows, strict=True))
     numbers = np.isfinite(mm) & np.isfinite(sigma)
@@ -158,6 +188,7 @@ PARTS = {  # the longest first: they run on all cores
     "speeds": lambda: errors_of(lambda s: Kind(s, speeds=3.0), 10),
     "rates": lambda: {str(hz): errors_of(lambda s, hz=hz: Kind(s, hz=hz), 11) for hz in (100.0, 35.0)},
     "stability": stability,
+    "onsets": onsets,
     "fig5": fig5,
 }
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...fields import Fields
-from .push import AXES_MOST, LEAST, LINE_LEAST, TIP_MM, UNITS, Press
+from .push import AXES_MOST, LEAST, TIP_MM, UNITS, Press
 
 CREEP, CREEP_S = 0.075, 0.5  # further tilt after a long time, share, and its time constant (whisker_physics section 6)
 LOG_KAPPA_SD = 1.5  # about 1, whisker_physics section 6: plugs from 0.1 to clamped are conceivable
@@ -21,7 +21,6 @@ CONE_OVER_HIGH, LOG_CONE_SD = 1.3, 0.15
 LOG_KAPPA_LIMITS, LOG_CONE_LIMITS = (-4.0, 4.0), (0.02, 2.0)  # of kappa; of cone over outermost radius
 SPREAD_FIRST, SPREAD_LEAST = 0.05, 0.002  # of ln deflection; the paper's whisks: 0.026 to 0.082
 ROUNDS = 12
-EARLY = (0.1, 0.6)  # of a push: after the onset as it was found, before creep and slips tell
 LEAST_CONTACTS, LEAST_PLACES = 5, 3
 
 
@@ -76,13 +75,13 @@ class Plug:
     @classmethod
     def fit(cls, presses: list[Press | None], radius_mm: np.ndarray) -> "Plug | None":
         """Of pushes at known radii (n,) mm; None where they are too few, or not alike."""
-        use = [n for n, press in enumerate(presses) if press is not None and press.depth[-1] > 0.0]
+        use = [n for n, press in enumerate(presses) if press is not None and press.steady > 0.0]
         pushes, radii = [presses[n] for n in use], np.asarray(radius_mm, np.float64)[use]
         if len(use) < LEAST_CONTACTS or len(np.unique(radii)) < LEAST_PLACES or len({p.unit for p in pushes}) != 1:
             return None
-        ends = np.array([push.deflection[-1] for push in pushes])
+        ends = np.array([push.deflection[push.end] for push in pushes])
         sizes = np.linalg.norm(ends, axis=1)
-        angles = np.array([_pushed(push) for push in pushes])
+        angles = np.array([push.steady for push in pushes])
         if not (sizes > 0.0).all() or not (angles > 0.0).all():
             return None
         unit = pushes[0].unit
@@ -94,17 +93,6 @@ class Plug:
         log_counts, kappa, cone_mm, spread = _fitted(radii, log_share)
         direction /= max(1e-9, float(np.linalg.norm(direction)))
         return cls(unit, math.exp(log_counts), kappa, cone_mm, spread, direction)
-
-
-def _pushed(press: Press) -> float:
-    """Advance from where the line through the push's first half meets the rest: an onset is known to a window only."""
-    size = press.deflection @ (press.deflection[-1] / max(1e-9, float(np.linalg.norm(press.deflection[-1]))))
-    part = (press.depth > EARLY[0] * press.depth[-1]) & (press.depth < EARLY[1] * press.depth[-1])
-    if np.count_nonzero(part) < LINE_LEAST or not np.ptp(press.depth[part]) > 0.0:
-        return float(press.depth[-1])
-    slope, size_0 = np.polyfit(press.depth[part], size[part], 1)
-    meets = -size_0 / slope if slope > 0.0 else 0.0
-    return float(press.depth[-1] - np.clip(meets, -EARLY[0] * press.depth[-1], EARLY[0] * press.depth[-1]))
 
 
 def creep_of(seconds: np.ndarray) -> np.ndarray:

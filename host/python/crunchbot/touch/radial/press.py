@@ -47,7 +47,7 @@ DIRECTIONS_MOST = 72
 
 def features_of(press: Press, depth: float) -> np.ndarray | None:
     """(ln f, direction over the channels, ln of f at a quarter and half of the depth over f); None: not as deep yet."""
-    if len(press.depth) == 0 or press.depth[-1] < depth:
+    if press.steady < depth:
         return None
     here, half, quarter = (_deflection(press, share * depth) for share in (1.0, 0.5, 0.25))
     size = float(np.linalg.norm(here))
@@ -189,7 +189,8 @@ class PressModel(Known):
                 f"radial fit: {len(use)} of {len(radii)} contacts show a push, at {places} radii; at least "
                 f"{LEAST_CONTACTS}, at {LEAST_PLACES} radii or more, all with the same column of motion, are needed"
             )
-        deepest = DEEPEST_SHARE * min(float(presses[n].depth[-1]) for n in use)
+        grown = np.array([presses[n].steady for n in use])
+        deepest = DEEPEST_SHARE * min(float(np.median(grown[radii[use] == place])) for place in np.unique(radii[use]))
         stages, errors = {}, []
         for direction in np.unique(directions[use]):  # equal NaNs count as one
             mine = [n for n in use if directions[n] == direction or np.isnan(direction)]
@@ -285,9 +286,9 @@ def _stages_of(presses: list[Press], radii: np.ndarray, window: float, deepest: 
         features = [features_of(press, depth) for press in presses]
         use = [n for n, one in enumerate(features) if one is not None]
         if len(use) >= LEAST_CONTACTS and len(np.unique(radii[use])) >= LEAST_PLACES:
-            found.append(Stage.fit(depth, np.array([features[n] for n in use]), radii[use]))
+            found.append((*Stage.fit(depth, np.array([features[n] for n in use]), radii[use]), radii[use]))
     if not found:
         raise ValueError("radial fit: the pushes are too short or too few at one direction; record more")
-    places, contacts = found[-1][1:]
-    inner = (radii[use] > radii[use].min()) & (radii[use] < radii[use].max())
-    return [stage for stage, _, _ in found], places[inner], contacts
+    _, places, contacts, radii = found[-1]
+    inner = (radii > radii.min()) & (radii < radii.max())
+    return [stage for stage, *_ in found], places[inner], contacts

@@ -13,8 +13,12 @@ RADIUS_MOST_MM = 1e5
 TIP_MM = 3.0  # from the outermost calibrated radius outwards it is the tip
 LEAST = 1e-12  # of what must be above 0
 LINE_LEAST = 8  # samples in a line
-ONSET_SHARE = 0.06  # of the shortest push in calibration: lines before and after the onset
-ONSET_CLEAR = 0.4  # of the largest change of slope; later, larger ones may be slips (docs/methods/radial.md)
+ONSET_SHARE = 0.06  # of the shortest push in calibration: depth up to which an onset is not certain
+# A slip: a fall by more than the paper's whisks differ in the mean, of their deflection, between parts of that window, or
+# samples, within which the push itself makes up for less than half of that.
+SLIP, SLIP_SHARE, SLIP_LEAST = 0.05, 0.25, 3
+POINTS, TOUCHES, FINER = 200, 64, 8  # of the fit of an onset: means of samples, places tried, and between two of these
+STARTED = 0.5  # of the shortest push in calibration: what advances so far and shows no touch began in contact
 MEDIAN = 5  # samples: a running median takes out single bad records
 AXES_MOST = 8
 UNITS = {"depth_mm": "mm", "push_mm_s": "mm", "whisk_rad_s": "rad", "": "s"}
@@ -39,13 +43,19 @@ class Contact:
 
 
 class Press(NamedTuple):
-    """The push of a contact: depth (n,) from its onset on, deflection (n, channels) about the rest, unit of depth, and how long
-    it took."""
+    """The push of a contact: depth (n,) from its onset on, deflection (n, channels) about the rest, unit of depth; how long
+    it grew without a slip, and up to which depth."""
 
     depth: np.ndarray
     deflection: np.ndarray
     unit: str
     seconds: float
+    steady: float
+
+    @property
+    def end(self) -> int:
+        """Index of the last sample before a slip."""
+        return max(0, int(np.searchsorted(self.depth, self.steady, "right")) - 1)
 
 
 def advance_of(contact: Contact) -> tuple[np.ndarray, str]:
@@ -86,15 +96,20 @@ def press_of(contact: Contact, window: float) -> Press | None:
     t_s, advance, samples = contact.t_s[good], advance[good], _median(contact.samples[good])
     if len(t_s) < 4 * LINE_LEAST or not t_s[-1] > t_s[0]:
         return None
-    end = push_end(advance, samples, contact.depth_mm is not None)
-    width = max(LINE_LEAST, _samples_in(window, advance[: end + 1]))
-    onset = _onset(t_s[: end + 1], samples[: end + 1], width)
-    if onset is None:
+    end = push_end(advance, samples, contact.depth_mm is not None) + 1
+    t_s, advance, samples = t_s[:end], np.maximum.accumulate(advance[:end]), samples[:end]
+    if end < LINE_LEAST or not advance[-1] > advance[0]:
         return None
-    before = slice(max(0, onset - width), onset + 1)
-    rest = _line_end(t_s[before], samples[before])
-    after = slice(onset, end + 1)
-    return Press(advance[after] - advance[onset], samples[after] - rest, unit, float(t_s[end] - t_s[onset]))
+    touched, rest = _touch(t_s, advance, samples)
+    width = max(SLIP_LEAST, _samples_in(SLIP_SHARE * window, advance))
+    steady = _steady_end(samples, int(np.searchsorted(advance, touched)), width)
+    if LINE_LEAST <= steady < end and advance[steady - 1] > advance[0]:
+        touched, rest = _touch(t_s[:steady], advance[:steady], samples[:steady])
+    if touched == advance[0] and advance[steady - 1] - touched < STARTED * window / ONSET_SHARE:
+        return None
+    first = int(np.searchsorted(advance, touched))
+    seconds = float(t_s[steady - 1] - np.interp(touched, advance, t_s))
+    return Press(advance[first:] - touched, samples[first:] - rest, unit, seconds, float(advance[steady - 1] - touched))
 
 
 def _median(samples: np.ndarray) -> np.ndarray:
@@ -121,27 +136,49 @@ def _samples_in(window: float, advance: np.ndarray) -> int:
     return min(len(advance), int(window * len(steps) / steps.sum())) if len(steps) else 0
 
 
-def _line_end(t_s: np.ndarray, samples: np.ndarray) -> np.ndarray:
-    """Value (channels,) at its last time of a least-squares line: a rest that drifts, as it is at the onset."""
-    off = t_s - t_s.mean()
-    square = float(off @ off)
-    slope = off @ (samples - samples.mean(axis=0)) / square if square > 0.0 else 0.0
-    return samples.mean(axis=0) + slope * off[-1]
+def _steady_end(samples: np.ndarray, first: int, width: int) -> int:
+    """How many samples the deflection grows, from sample `first` on, without a slip: a fall between means over `width`."""
+    pushed = samples[first:]
+    if len(pushed) < 2 * width:
+        return len(samples)
+    bent = pushed[-width:].mean(axis=0) - pushed[:width].mean(axis=0)
+    along = pushed @ bent / max(LEAST, float(np.linalg.norm(bent)))
+    means = np.convolve(along, np.ones(width) / width, "valid")
+    falls = np.flatnonzero(means[:-width] - means[width:] > SLIP * np.ptp(means))
+    return first + int(falls[0]) + width if len(falls) else len(samples)
 
 
-def _onset(t_s: np.ndarray, samples: np.ndarray, width: int) -> int | None:
-    """Index of the first clear change of slope, between lines over `width` samples before and after it."""
-    count = len(t_s) - width
-    if count <= width:
-        return None
-    x = (t_s - t_s[0])[:, None]
-    y = samples - samples.mean(axis=0)
-    sums = [np.cumsum(np.vstack([np.zeros((1, part.shape[1])), part]), axis=0) for part in (x, x * x, y, x * y)]
-    sx, sxx, sy, sxy = (total[width:] - total[:-width] for total in sums)
-    slopes = (width * sxy - sx * sy) / np.maximum(width * sxx - sx * sx, 1e-300)
-    change = np.linalg.norm(slopes[width:] - slopes[:-width], axis=1)
-    first = int(np.argmax(change >= ONSET_CLEAR * change.max()))
-    return width + first + int(np.argmax(change[first : first + width]))
+def _touch(t_s: np.ndarray, advance: np.ndarray, samples: np.ndarray) -> tuple[float, np.ndarray]:
+    """Advance at the touch, and the rest (channels,) there: least squares of a rest that drifts and of a deflection that
+    grows from the touch on. Where none of these has been at rest before, it touches from its first sample on."""
+    parts = np.array_split(np.arange(len(t_s)), min(len(t_s), POINTS))
+    means = [np.array([column[rows].mean(axis=0) for rows in parts]) for column in (t_s - t_s[0], advance, samples)]
+    step = (means[1][-1] - advance[0]) / TOUCHES
+    tried = advance[0] + step * np.arange(TOUCHES)
+    left, rest = _left(*means, tried)
+    best = int(np.argmin(left))
+    if best > 0:
+        tried = tried[best] + step * np.linspace(-1.0, 1.0, FINER + 1)[1:-1]
+        left, rest = _left(*means, tried)
+        best = int(np.argmin(left))
+    return float(tried[best]), rest[best]
+
+
+def _left(
+    t_s: np.ndarray, advance: np.ndarray, samples: np.ndarray, touched: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What a touch at each of these (k,) leaves unexplained, and the rest there (k, channels). Infinite unless the whisker bends
+    by more behind it than before, and faster; but for a touch at the first sample, before which nothing is."""
+    depth, at_s = np.clip(advance - touched[:, None], 0.0, None), np.interp(touched, advance, t_s)[:, None]
+    part = depth / depth[:, -1:]
+    before = at_s > 0.0
+    columns = np.stack([np.ones_like(part), before * (t_s - at_s) / t_s[-1], part, part**2, part**3], axis=2)
+    square = columns.transpose(0, 2, 1) @ columns + LEAST * np.eye(5)
+    fitted = np.linalg.solve(square, columns.transpose(0, 2, 1) @ samples)
+    left = np.square(samples - columns @ fitted).sum(axis=(1, 2))
+    drift, grown = np.linalg.norm(fitted[:, 1], axis=1), np.linalg.norm(fitted[:, 2:].sum(axis=1), axis=1)
+    rests = grown > drift * np.maximum(at_s, t_s[-1] - at_s)[:, 0] / t_s[-1]
+    return np.where(rests | ~before[:, 0], left, np.inf), fitted[:, 0]
 
 
 def reach_of(contact: Contact) -> float:
