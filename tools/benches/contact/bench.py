@@ -59,7 +59,7 @@ def summary(kind: str, found: list[dict]) -> dict:
         "cost_us": float(np.mean([one["cost_us"] for one in found])),
     }
     if np.isfinite(late("turn")).all():
-        reported |= normal_figures(late("turn"), late("turn_inside"), late("taken"))
+        reported |= normal_figures(late("turn"), late("turn_inside"), late("published_inside"), late("taken"))
         reported |= {"taken": float(late("taken").sum() / (refused + kept)), "contour_rms_mm": rms(late("contour"))}
     if true_motion(kind) == "sweep":
         last = np.array([one["speed"][-1] for one in found if len(one["speed"])])
@@ -71,7 +71,10 @@ def summary(kind: str, found: list[dict]) -> dict:
     return reported
 
 
-def normal_figures(turn: np.ndarray, inside: np.ndarray, taken: np.ndarray) -> dict[str, float | None]:
+def normal_figures(
+    turn: np.ndarray, inside: np.ndarray, published: np.ndarray, taken: np.ndarray
+) -> dict[str, float | None]:
+    """`published`: within the region that a pilot publishes."""
     return {
         "normal_median_deg": median(turn),
         "normal_rms_deg": rms(turn),
@@ -79,7 +82,7 @@ def normal_figures(turn: np.ndarray, inside: np.ndarray, taken: np.ndarray) -> d
         "taken_median_deg": median(turn[taken]),
         "taken_rms_deg": rms(turn[taken]),
         "taken_worst_deg": float(np.abs(turn[taken]).max()) if taken.any() else None,
-        "taken_held_90": float(inside[taken].mean()) if taken.any() else None,
+        "taken_held_90": float(published[taken].mean()) if taken.any() else None,
     }
 
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crunchbot.pilot.feel import SURE
-from crunchbot.touch.contact_filter import ContactFilter, Reports
+from crunchbot.pilot.feel import MODEL_RAD
+from crunchbot.touch.contact_filter import ContactFilter
 
 from .scenes import QUARTER, REACH_M, TICK_S, TIP, Corner, Draw, Plan, Scene, chained, lying
 
@@ -181,29 +181,25 @@ def follow(case: Case, kind: str, scene: Scene, least: np.ndarray | None) -> dic
     across = np.column_stack([np.cos(scene.normal[at]), np.sin(scene.normal[at])])
     return {
         "after_s": after_s,
-        "late": (after_s >= max(FIRST_S, first_s)) & (found.other[use] < 0.5),
-        "refused": (after_s >= max(FIRST_S, first_s)) & (found.other[use] >= 0.5),
+        "late": (after_s >= max(FIRST_S, first_s)) & found.sure[use],
+        "refused": (after_s >= max(FIRST_S, first_s)) & ~found.sure[use],
         "off": 1e3 * np.hypot(*off.T),
         "stated": 1e3 * np.sqrt(np.trace(found.point_cov[use], axis1=1, axis2=2)),
         "least": least[at] if least is not None else np.full(len(at), np.nan),
         "inside": np.einsum("ki,kij,kj->k", off, np.linalg.inv(found.point_cov[use]), off) < NINETY_2,
         "turn": turn,
         "turn_inside": (turn / np.degrees(found.normal_sd[use])) ** 2 < NINETY_1,
+        "published_inside": (turn / np.degrees(np.hypot(found.normal_sd[use], MODEL_RAD))) ** 2 < NINETY_1,
         "contour": 1e3 * np.abs((off * across).sum(axis=1)),
         "speed": (found.speed[use] - speed) / np.where(speed > 1e-9, speed, np.nan),
         "speed_inside": (found.speed[use] - speed) ** 2 < NINETY_1 * found.speed_sd[use] ** 2,
         "motion": np.array(found.motion)[use],
         "corner": found.corner[use],
-        "taken": taken(found)[use],
+        "taken": found.faced[use],
         "slip": found.slip[use],
         "slides": slides(scene, at),
         "cost_us": cost_us(held, bases, tilt),
     }
-
-
-def taken(found: Reports) -> np.ndarray:
-    """(k,) Where a pilot takes the normal (crunchbot.pilot.feel)."""
-    return (found.tip >= SURE) & (found.sweep < 0.5) & (found.other < 0.5)
 
 
 def cost_us(held: ContactFilter, bases: np.ndarray, tilt: np.ndarray) -> float:

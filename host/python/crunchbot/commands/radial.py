@@ -127,6 +127,7 @@ def _follow(arguments, contact: str, at_s: float, reported: Reports, k: int) -> 
     if arguments.json:
         made = {"contact": contact, "t_s": at_s, "point_mm": [x, y], "point_sd_mm": [sd_x, sd_y]}
         made |= {"normal_deg": normal, "normal_sd_deg": normal_sd, "motion": reported.motion[k]}
+        made |= {name: bool(getattr(reported, name)[k]) for name in ("sure", "faced")}
         made |= {
             name: getattr(reported, name)[k]
             for name in ("sweep", "corner", "tip", "slip", "speed", "speed_sd", "curvature", "other")
@@ -136,5 +137,5 @@ def _follow(arguments, contact: str, at_s: float, reported: Reports, k: int) -> 
     kind = "tip" if reported.tip[k] > 0.5 else "corner" if reported.corner[k] > 0.5 else "shaft"
     print(
         f"{contact}  after {at_s:.3f} s  ({x:.1f} +- {sd_x:.1f}, {y:.1f} +- {sd_y:.1f}) mm  "
-        f"normal {normal:.0f} +- {normal_sd:.0f} degrees  {kind}  {reported.motion[k]}"
+        f"normal {normal:.0f} +- {normal_sd:.0f} degrees  {kind}  {reported.motion[k]}{'' if reported.sure[k] else '  not sure'}"
     )

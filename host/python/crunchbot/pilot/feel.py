@@ -16,7 +16,6 @@ REST_BLOCKS = 2  # that give the rest: creep of an earlier contact may be left i
 BLOCKS_BEFORE = REST_BLOCKS + 4  # the filter begins so long before the onset: it finds the touch in the noise itself
 NOISE_COUNTS = 11.0  # of one sample (crunchbot.touch.contact)
 LEAST_TICKS = 200  # of a contact, before which the ringing of the touch is stronger than the surface's vibration
-SURE = 0.9  # probability that the tip is on a surface, from which its normal is reported
 MODEL_RAD = 0.05  # error of a normal beside what the filter states: it knows a calibrated whisker, not the whisker
 
 
@@ -123,11 +122,11 @@ class Feeler:
             or ticks[max(reported.sample[-1], 0)] < contact.onset + LEAST_TICKS
         ):
             return
-        self.felt = self._placed(reported, ticks) if reported.other[-1] < 0.5 else None
+        self.felt = self._placed(reported, ticks) if reported.sure[-1] else None
         bent = abs(float(np.median(tilts[:, 0])))
         if bent >= self.most:
             self.most, self.bent = bent, self.felt
-        self._doubted |= self.last is not None and self.felt is None and bent > CREEP * self.most
+        self._doubted |= self.last is not None and reported.other[-1] >= 0.5 and bent > CREEP * self.most
         self.last = None if self._doubted else self.felt or self.last
 
     def _bases(self, drives: np.ndarray) -> np.ndarray:
@@ -148,7 +147,7 @@ class Feeler:
         point_sd, slip = math.sqrt(np.trace(reported.point_cov[-1]) / 2.0), float(reported.slip[-1])
         felt = Felt(int(ticks[max(reported.sample[-1], 0)]), point, point_sd, slip=slip)
         face, sd = float(reported.tip[-1]), math.hypot(reported.normal_sd[-1], MODEL_RAD)
-        if face < SURE or reported.sweep[-1] > 0.5:
+        if not reported.faced[-1]:
             return replace(felt, face=face)
         normal = math.remainder(self._yaw + self._out * reported.normal_rad[-1], 2.0 * math.pi)
         return replace(felt, normal=normal, normal_sd=sd, face=face)

@@ -23,12 +23,13 @@ import numpy as np
 from .. import observation
 from ..observation import CARRIED, EXPLORING, NORMAL, POINT, RELEASE, WHISK, Layout, Quantity, Row
 from ..touch.contact import Contact
+from ..touch.contact_filter import SURE
 from ..touch.floor import WINDOW_LEAST_GOOD, WINDOW_SAMPLES, floor_whisker
 from ..touch.mount import Mount
 from ..touch.radial.model import Contact as Recorded
 from ..touch.radial.model import estimate, peak
 from .behaviour import BLOCK_TICKS, TICK_S, Behaviour, Habits, Whisk
-from .feel import SURE, Drives, Feeler, Felt
+from .feel import Drives, Feeler, Felt
 from .states import FULL
 from .tip import contact_type, move_for_tip
 from .wheels import EXACT, NO_BUMPS, Bumps, Wheels

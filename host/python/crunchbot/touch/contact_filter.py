@@ -38,6 +38,10 @@ LIMITS = {"friction": 0.5, "moving": 0.5, "caught": 0.3, "other": 0.1}
 TIPS = (0.3001, 0.8499)  # length over cone, just within the ends of the beam's tables (contact_beam.h)
 LEAST_SAMPLES = 100
 MOTIONS = ("body whisk", "drive-by", "sweep")
+SURE = 0.9  # probability from which on something is said: a tip on a surface, a corner
+# Deviations up to which something is sure. In 118 contacts of chains regions of places held in 91 % of the reports up to 6 mm (n
+# 1477) and in 14 % above (n 36): their hypotheses lie apart. Normals above 10 degrees were 15 off in the median (n 49).
+POINT_MOST_M, NORMAL_MOST_RAD = 0.006, float(np.radians(10.0))
 
 
 def settings_of(plug: Plug, length_m: float) -> dict[str, float]:
@@ -75,6 +79,18 @@ class Reports(NamedTuple):
     curvature: np.ndarray  # of the surface, 1/m, a corner's counted as 0
     curvature_sd: np.ndarray
     other: np.ndarray  # probability that none of the hypotheses holds, as of a push along the whisker
+
+    @property
+    def sure(self) -> np.ndarray:
+        """(k,) Whether the point is known."""
+        point_sd = np.sqrt(np.trace(self.point_cov, axis1=1, axis2=2) / 2.0)
+        return (self.other < 0.5) & (point_sd <= POINT_MOST_M)
+
+    @property
+    def faced(self) -> np.ndarray:
+        """(k,) Whether the normal is known: of a surface that stands, under the tip."""
+        on = (self.tip >= SURE) & (self.sweep < 0.5) & (self.normal_sd <= NORMAL_MOST_RAD)
+        return self.sure & on
 
 
 class ContactFilter:

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..scene import Whisker
+from .contact_filter import SURE
 
-SURE = 0.9  # probability of face or corner
 NEAREST_MM = 60.0  # the line is fitted from 90 mm on; what reads much nearer was no plain contact
 
 

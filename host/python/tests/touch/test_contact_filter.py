@@ -10,7 +10,7 @@ from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from whisks import whisk, whisks
 
 from crunchbot import scene
-from crunchbot.pilot.feel import SURE, Feeler
+from crunchbot.pilot.feel import Feeler
 from crunchbot.touch.contact_filter import ContactFilter
 from crunchbot.touch.radial import model as radial
 from crunchbot.touch.radial.push import Contact
@@ -85,8 +85,8 @@ def chained() -> dict[str, np.ndarray]:
         found["held"].append((far < 4.605)[late])
         found["turn_deg"].append(np.degrees(np.abs(turn))[late])
         found["turn_held"].append((np.abs(turn) < 1.645 * said.normal_sd)[late])
-        found["refused"].append((said.other >= 0.5)[late])
-        found["taken"].append(((said.tip >= SURE) & (said.sweep < 0.5) & (said.other < 0.5))[late])
+        found["refused"].append(~said.sure[late])
+        found["taken"].append(said.faced[late])
     return {name: np.concatenate(parts) for name, parts in found.items()}
 
 
@@ -100,6 +100,21 @@ def test_regions_hold_at_any_angle_between_drive_and_surface():
     assert found["taken"].mean() > 0.3
     assert np.median(found["turn_deg"][found["taken"]]) < 5.0
     assert found["turn_held"][found["taken"]].mean() > 0.85
+
+
+def test_what_is_uncertain_is_not_sure():
+    bases, tilts, _ = swept(0.12)
+    said = ContactFilter().run(bases, tilts)
+    assert said.sure[-1]
+    for doubt in ({"point_cov": said.point_cov + 1e-4 * np.eye(2)}, {"other": said.other + 0.5}):
+        assert not said._replace(**doubt).sure.any()
+    known = dict.fromkeys(("tip", "sweep", "normal_sd"), np.zeros(len(said.sample))) | {
+        "tip": np.ones(len(said.sample))
+    }
+    assert said._replace(**known).faced[-1]
+    for doubt in ({"tip": 0.8}, {"sweep": 0.6}, {"normal_sd": 0.2}):
+        name, value = doubt.popitem()
+        assert not said._replace(**(known | {name: known[name] * 0.0 + value})).faced.any()
 
 
 @pytest.mark.parametrize(
