@@ -15,10 +15,9 @@ enum { CORNERS = 14, ROUNDS = 8, NORMALS = 5 };
 #define SHAFT_CURVATURE_SD 15.0
 #define TIP_CURVATURE_SD 10.0  /* under the tip, about 0 */
 #define CORNER_CURVATURE 200.0 /* beyond is a corner */
-#define POINT_LEAST_M 2e-4 /* a contact lies on the whisker, not on its axis: radius 0.15 mm at the tip, 0.4 halfway   \
-                            */
-#define NORMAL_LEAST 0.003 /* rad */
-#define FLAT 0.02          /* rad, cones: what is not known of a contact that has gone over between tip and shaft */
+#define POINT_LEAST_M 2e-4     /* a contact is on the whisker, not on its axis: 0.15 mm off at the tip, 0.4 halfway */
+#define NORMAL_LEAST 0.003     /* rad */
+#define FLAT 0.02              /* rad, cones: what is not known of a contact that has gone over between tip and shaft */
 #define EDGE 1e-3
 #define LEAST_OVER 1e-2 /* probability from which on a part of a hypothesis goes over */
 #define HOPS 0.5        /* share of the contacts under the tip in which it chatters: nothing is known of it */
