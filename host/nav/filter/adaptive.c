@@ -19,6 +19,15 @@
  * second of the histogram's, or others are drawn; a mode that holds the third is the only one. */
 static const double SHARE_LEAST = 1e-9, KNOWN_LEAST = 0.9, ONE_MODE = 0.999;
 
+/* Odds of a kidnap from which the arena is searched, and its inverse, from which the cloud is dropped; share of the
+ * histogram that a cloud may leave out. What is left out by each is a hundredth of the belief at most. */
+static const double WAKE = 0.01, SCATTERED = 0.01;
+
+/* Prior standard deviation of the odometry's gains: as far as the benches' wheels are off
+ * (tools/benches/nav/worlds.py).
+ */
+static const double GAIN = 0.15;
+
 /* Nats that a cloud drawn from the histogram must have explained better than "anywhere" before it may blame the map:
  * one that was drawn around the wrong place would explain itself. */
 static const double PROVEN = 300.0;
@@ -97,7 +106,7 @@ static struct adaptive_held adaptive_hold(const struct adaptive *a)
                                   .local = a->local ? &a->cloud.set : NULL,
                                   .global = two ? &a->global : NULL,
                                   .log = &a->log,
-                                  .share = two || share > a->problem->settings.adaptive.wake ? share : 0.0};
+                                  .share = two || share > WAKE ? share : 0.0};
 }
 
 static void adaptive_sum_up(struct adaptive *a)
@@ -117,7 +126,7 @@ static bool adaptive_begin_cloud(struct adaptive *a)
 /* A mixture that a cloud can hold: in doubt from the start, by the share that it may be wrong. A wider one: unknown. */
 static void adaptive_begin_mixture(struct adaptive *a)
 {
-    bool few = adaptive_global_fill(&a->global) * a->problem->settings.adaptive.per_bin <= a->global.room;
+    bool few = adaptive_global_fill(&a->global) * ADAPTIVE_PER_BIN <= a->global.room;
     a->local = few && adaptive_begin_cloud(a);
     if (a->local)
         adaptive_global_restart(&a->global, 0);
@@ -144,11 +153,11 @@ static int adaptive_init_cloud(struct adaptive *a)
 {
     const struct nav_settings *s = &a->problem->settings;
     struct adaptive_cloud *cloud = &a->cloud;
-    cloud->sample.error = 0.5 / s->adaptive.per_bin; /* many bins: twice the error by the bins, less 1 (Fox) */
+    cloud->sample.error = 0.5 / ADAPTIVE_PER_BIN; /* many bins: twice the error by the bins, less 1 (Fox) */
     cloud->sample.most = (long)a->global.room;
     cloud->sample.least = (long)fmin(s->adaptive.least, a->global.room);
     nav_rng_seed(&cloud->rng, a->problem->seed, 0);
-    return nav_particles_init(&cloud->set, cloud->sample.most, true, s->adaptive.gain) ||
+    return nav_particles_init(&cloud->set, cloud->sample.most, true, GAIN) ||
                    nav_bins_init(&cloud->bins, cloud->sample.most, a->global.cell.edge / 2.0,
                                  a->global.cell.heading / 2.0)
                ? -1
@@ -216,7 +225,7 @@ static void adaptive_resample(struct adaptive *a, bool force)
 static void adaptive_draw_particles(struct adaptive *a, double share)
 {
     const struct nav_settings *s = &a->problem->settings;
-    double count = fmin(fmax(s->adaptive.least, a->global.crowd * s->adaptive.per_bin), a->global.room / 2.0);
+    double count = fmin(fmax(s->adaptive.least, a->global.crowd * ADAPTIVE_PER_BIN), a->global.room / 2.0);
     struct nav_particles *set = &a->cloud.set;
     long held = a->local ? set->count : 0;
     set->count = held;
@@ -281,7 +290,7 @@ static void adaptive_weigh_modes(struct adaptive *a)
         adaptive_keep_shares(a);
         if (most > ONE_MODE)
             adaptive_stop_search(a);
-    } else if (a->global.scattered < a->problem->settings.adaptive.scattered) {
+    } else if (a->global.scattered < SCATTERED) {
         a->local = false;
         adaptive_draw_particles(a, 1.0);
     } else {
@@ -300,19 +309,18 @@ static void adaptive_drop_particles(struct adaptive *a)
  * the cloud is wrong. */
 static void adaptive_end_search(struct adaptive *a, double present)
 {
-    const struct nav_adaptive_settings *s = &a->problem->settings.adaptive;
-    if (a->global.scattered < s->scattered && present > log(s->wake))
+    if (a->global.scattered < SCATTERED && present > log(WAKE))
         adaptive_draw_particles(a, adaptive_kidnap_probability(a));
-    else if (a->kidnap.ratio <= 0.0 && present <= log(s->wake))
+    else if (a->kidnap.ratio <= 0.0 && present <= log(WAKE))
         adaptive_keep_particles(a);
-    else if (present > -log(s->wake))
+    else if (present > -log(WAKE))
         adaptive_drop_particles(a);
 }
 
 static void adaptive_decide(struct adaptive *a)
 {
     double present = adaptive_log_odds(a);
-    bool kidnapped = present > log(a->problem->settings.adaptive.wake), shared = a->whole && a->local;
+    bool kidnapped = present > log(WAKE), shared = a->whole && a->local;
     if (!a->awake ? kidnapped
                   : shared && present > 0.0) /* a search of the whole arena costs what is known of the modes */
         adaptive_start_search(a);
@@ -386,12 +394,11 @@ static void adaptive_learn(struct adaptive *a)
  */
 static void adaptive_hand_over(struct adaptive *a)
 {
-    const struct nav_settings *s = &a->problem->settings;
     const struct nav_bins *bins = &a->cloud.bins; /* in 4 deviations: */
     double across = 1.0 + 4.0 * sqrt(a->pending.noise.position) / bins->edge;
     double turned = 1.0 + 4.0 * sqrt(a->pending.noise.heading) * bins->turns / (2.0 * NAV_PI);
     if (!a->pending_unknown || !a->local || (a->awake && !a->whole) ||
-        across * across * turned * s->adaptive.per_bin <= a->global.room)
+        across * across * turned * ADAPTIVE_PER_BIN <= a->global.room)
         return;
     adaptive_global_clear(&a->global, a->log.head);
     adaptive_give_particles(a, a->cloud.set.count, 1.0);
@@ -453,7 +460,7 @@ static struct nav_resolution adaptive_resolution(const void *self)
 {
     const struct adaptive_global *g = &((const struct adaptive *)self)->global;
     const struct nav_shape finest = nav_levels_shape(&g->histogram.levels, 0);
-    return (struct nav_resolution){finest.cell, finest.cell_theta, g->wanted, g->first.too_wide};
+    return (struct nav_resolution){finest.cell, finest.cell_theta, g->cell.edge, g->first.too_wide};
 }
 
 const struct nav_filter_ops nav_adaptive_filter = {.name = "adaptive",

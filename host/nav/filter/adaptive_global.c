@@ -246,8 +246,7 @@ static void global_take_job(struct adaptive_global *g, struct adaptive_log *log,
     bool refined = h->level > 0 && h->total > 0.0 && 8 * h->cells <= REFINED_MOST && nav_histogram_refine(h);
     g->scattered = 1.0;
     global_end(g);
-    if (!refined && !h->uniform && h->level == 0 &&
-        (double)h->heaviest * g->room >= g->problem->settings.adaptive.per_bin * h->total)
+    if (!refined && !h->uniform && h->level == 0 && (double)h->heaviest * g->room >= ADAPTIVE_PER_BIN * h->total)
         global_count(g);
 }
 
@@ -363,11 +362,8 @@ struct nav_pending adaptive_global_since(const struct adaptive_global *g, const 
 static int global_levels(struct adaptive_global *g, struct nav_levels *levels)
 {
     const struct nav_problem *problem = g->problem;
-    const struct nav_settings *s = &problem->settings;
-    struct nav_cell scene;
-    if (nav_problem_cell(problem, 0.0, &scene) || nav_problem_cell(problem, s->adaptive.cell_m, &g->cell))
+    if (nav_problem_cell(problem, 0.0, &g->cell))
         return -1;
-    g->wanted = fmin(scene.edge, g->cell.edge);
     *levels = (struct nav_levels){problem->arena.size_x, problem->arena.size_y, g->cell.edge, 0, 0};
     levels->headings = (nav_cell_headings(&g->cell) + 3) / 4 * 4;
     levels->headings_least = (int)(2.0 * NAV_PI / HEADING_MOST);

@@ -12,6 +12,9 @@
 #include "histogram.h"
 #include "particles.h"
 
+/* Hypotheses in each bin, half a cell each way, that they occupy. */
+#define ADAPTIVE_PER_BIN 8.0
+
 /* Some rows on their way into the belief. */
 struct adaptive_job {
     struct nav_pose step;
@@ -45,7 +48,6 @@ struct adaptive_global {
     struct nav_weigh weigh;
     struct adaptive_first first;
     struct nav_cell cell; /* the finest level's */
-    double wanted;        /* m, its edge where no user sets another */
     double open;          /* share of the cells that can hold mass: the ground's */
     float **factor;       /* [whiskers][codes] log-likelihood of the present job */
     struct adaptive_job job;

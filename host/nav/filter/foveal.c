@@ -10,6 +10,9 @@
 #include "likelihood.h"
 #include "mixture.h"
 
+/* Between the outermost cells and headings, as in the paper. */
+static const double DIAMETER_M = 0.25, SPAN_RAD = NAV_PI / 2.0;
+
 struct foveal {
     const struct nav_problem *problem;
     struct nav_likelihood *likelihood;
@@ -41,8 +44,8 @@ static void *foveal_create(const struct nav_problem *problem)
     f->problem = problem;
     f->belief = nav_mixture_prior(problem);
     f->cells = (int)settings->foveal.cells;
-    f->spacing = settings->foveal.diameter_m / (f->cells - 1);
-    f->spacing_theta = settings->foveal.span_deg * NAV_PI / 180.0 / (f->cells - 1);
+    f->spacing = DIAMETER_M / (f->cells - 1);
+    f->spacing_theta = SPAN_RAD / (f->cells - 1);
     struct nav_cell cell;
     if (nav_problem_cell(problem, 0.0, &cell)) {
         free(f);

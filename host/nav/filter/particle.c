@@ -14,6 +14,11 @@
 #include "gaussian.h"
 
 enum { CANDIDATES = 8 };
+/* Particles: at least as many as give one compact mode's spread to 4 % (1 / sqrt(2 n)), at most 1 MB of them. Their
+ * belief's divergence (Kullback-Leibler) exceeds the error once in a hundred rows (Fox). They are resampled when worth
+ * fewer than half of them (Doucet), and the fast average follows the weights ten times as fast as the slow one. */
+enum { LEAST = 300, MOST = 20000 };
+static const double ERROR = 0.05, RESAMPLED = 0.5, FASTER = 10.0;
 static const double FRESH_MOST = 0.5; /* share of the particles that may be fresh in one row */
 /* A run of bad windows lowers the fast average, too: it must fall to the slow one's 1 / MARGIN before anything is done.
  */
@@ -55,15 +60,14 @@ static void *particle_create(const struct nav_problem *problem)
     if (!f)
         return NULL;
     *f = (struct particle){.problem = problem, .slow = -1.0, .fast = -1.0};
-    double least = s->particle.least, most = s->particle.most;
-    if (s->particle.count > 0.0)
-        least = most = fmax(s->particle.count, 2.0);
-    f->sample = (struct nav_sample){s->particle.error, (long)fmin(least, most), (long)most};
+    long count = (long)fmax(s->particle.count, 2.0);
+    f->sample =
+        s->particle.count > 0.0 ? (struct nav_sample){ERROR, count, count} : (struct nav_sample){ERROR, LEAST, MOST};
     nav_rng_seed(&f->rng, problem->seed, 0);
     f->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, s, 0.0);
     struct nav_cell bin = {.edge = 0.0};
     if (f->likelihood)
-        bin = nav_sensors_cell(&f->likelihood->sensors, s->particle.cell_m);
+        bin = nav_sensors_cell(&f->likelihood->sensors, 0.0);
     if (!f->likelihood || nav_particles_init(&f->cloud, f->sample.most, false, 0.0) ||
         nav_bins_init(&f->bins, f->sample.most, bin.edge, bin.heading)) {
         particle_destroy(f);
@@ -123,7 +127,7 @@ static double particle_decline(struct particle *f, double mean_weight)
     if (f->slow < 0.0)
         f->slow = f->fast = mean_weight;
     f->slow += s->particle.recovery * (mean_weight - f->slow);
-    f->fast += s->particle.recovery_fast * (mean_weight - f->fast);
+    f->fast += FASTER * s->particle.recovery * (mean_weight - f->fast);
     double share = f->slow > 0.0 ? 1.0 - MARGIN * f->fast / f->slow : 0.0;
     return fmin(fmax(share, 0.0), FRESH_MOST);
 }
@@ -159,13 +163,12 @@ static void particle_resample(struct particle *f, double fresh)
 static void particle_update(void *self, const struct nav_evidence *evidence)
 {
     struct particle *f = self;
-    const struct nav_settings *s = &f->problem->settings;
     particle_catch_up(f);
     nav_likelihood_read(f->likelihood, evidence);
     f->weighed = f->cloud.count;
     double mean = exp(nav_particles_weigh(&f->cloud, f->likelihood, -1.0) - f->likelihood->ceiling);
     double fresh = particle_decline(f, mean);
-    bool uneven = nav_particles_effective(&f->cloud) < s->particle.resample * (double)f->cloud.count;
+    bool uneven = nav_particles_effective(&f->cloud) < RESAMPLED * (double)f->cloud.count;
     particle_summarise(f);
     if (uneven || fresh > 0.0)
         particle_resample(f, fresh);

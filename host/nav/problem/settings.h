@@ -55,8 +55,6 @@ struct nav_grid_settings {
 
 struct nav_foveal_settings {
     double cells;       /* per axis, odd (paper: 11) */
-    double diameter_m;  /* between the outermost cell centres (paper: 0.25) */
-    double span_deg;    /* between the outermost headings (paper: -45 to 45) */
     double quantum_m;   /* quantisation added to each posterior covariance, standard deviation of position */
     double quantum_deg; /* quantisation added to each posterior covariance, standard deviation of heading */
     double printed;     /* 1: equation 7 as printed, without weights */
@@ -64,25 +62,13 @@ struct nav_foveal_settings {
 };
 
 struct nav_particle_settings {
-    double count;         /* how many; 0: as many as the belief's spread asks for (KLD), `least` to `most` */
-    double least;         /* fewest particles */
-    double most;          /* most particles */
-    double error;         /* of that belief, Kullback-Leibler divergence exceeded once in a hundred rows */
-    double cell_m;        /* edge of a bin of that belief; 0: as the scene's detail asks */
-    double resample;      /* resamples when the effective share of the particles falls below this */
-    double recovery;      /* slow rate at which the mean weight is followed; 0: no recovery by injection */
-    double recovery_fast; /* fast rate */
+    double count;    /* how many; 0: as many as the belief's spread asks for (KLD) */
+    double recovery; /* slow rate at which the mean weight is followed; 0: no recovery by injection */
 };
 
 struct nav_adaptive_settings {
-    double most;      /* particles, at most */
-    double least;     /* particles, at least */
-    double per_bin;   /* particles in each bin, half a cell each way, that they occupy */
-    double gain;      /* prior standard deviation of the odometry's gains */
-    double cell_m;    /* edge of the arena-wide histogram's finest cells, bins half as wide; 0: as the scene's detail
-                         asks */
-    double wake;      /* odds of a kidnap at which the histogram wakes */
-    double scattered; /* share of the histogram that a cloud may leave out */
+    double most;  /* particles, at most */
+    double least; /* particles, at least */
 };
 
 struct nav_settings {

@@ -173,7 +173,7 @@ static void coarse_cells_are_refined_where_mass_is(void **state)
     struct belief b;
     begin(&b, 16.0);
     assert_true(b.g.first.level > 0 && b.g.histogram.level == b.g.first.level);
-    assert_near(b.g.histogram.levels.cell, b.g.wanted, 0.0);
+    assert_near(b.g.histogram.levels.cell, b.g.cell.edge, 0.0);
     nav_histogram_clear(&b.g.histogram, b.g.first.level);
     adaptive_global_add(&b.g, (struct nav_pose){8.01, 8.01, 0.3}, 1.0);
     adaptive_global_added(&b.g);
@@ -185,7 +185,7 @@ static void coarse_cells_are_refined_where_mass_is(void **state)
     }
     write(&b, NO_NOISE, NULL);
     work(&b);
-    assert_near(b.g.histogram.shape.cell, b.g.wanted, 1e-12);
+    assert_near(b.g.histogram.shape.cell, b.g.cell.edge, 1e-12);
     assert_true(b.g.scattered < 0.5 && b.g.summary.mass > 0.5);
     end(&b);
 }

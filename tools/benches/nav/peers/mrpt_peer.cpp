@@ -62,11 +62,11 @@ class Mrpt : public peer::Filter
         o.sampleSize = static_cast<unsigned>(cloud_.m_particles.size());
         o.adaptiveSampleSize = most > 0.0;
         if (o.adaptiveSampleSize) {
-            auto &kld = cloud_.options.KLD_params; // the widest bins of `particle`, its error and least number
+            auto &kld = cloud_.options.KLD_params; // widest bins, error and least number of host/nav/filter/particle.c
             kld.KLD_binSize_XY = NAV_NEAR_M / 5.0;
             kld.KLD_binSize_PHI = NAV_NEAR_RAD / 3.0;
-            kld.KLD_epsilon = scene.problem.settings.particle.error;
-            kld.KLD_minSampleSize = static_cast<unsigned>(scene.problem.settings.particle.least);
+            kld.KLD_epsilon = 0.05;
+            kld.KLD_minSampleSize = 300;
             kld.KLD_maxSampleSize = static_cast<unsigned>(most);
         }
     }
