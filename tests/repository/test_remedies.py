@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -137,13 +138,24 @@ def bin_(house, tmp_path) -> Path:
     return tmp_path / "venv/bin"
 
 
+def ros2_scene(folder: Path) -> Path:
+    """A scene with a base of ROS 2: `base` says what it takes without its extra, and needs it to drive."""
+    with zipfile.ZipFile(ROOT / "host/python/crunchbot/data/examples.zip") as examples:
+        examples.extractall(folder)
+    table = "[base]\nwheel_base_m = 0.16\nwheel_most_m_s = 0.22\nwheel_step_m_s = 0.01\nacceleration_m_s2 = 1.5\n"
+    with (folder / "scene/robot.toml").open("a") as robot:
+        robot.write(f'\n{table}[base.ros2]\nodometry = "/odom"\n')
+    return folder / "scene"
+
+
 @pytest.mark.skipif("WHISKER_DIST" not in os.environ, reason="WHISKER_DIST names no folder: make release-offline")
 @pytest.mark.parametrize("remedy", REMEDIES)
-def test_a_remedy_installs_what_its_command_needs(bin_, house, remedy):
+def test_a_remedy_installs_what_its_command_needs(bin_, house, remedy, tmp_path):
     extra = remedy.partition("[")[2].rstrip("]")
     needing = [command for command, one in EXTRAS.items() if one == extra and command not in LAB_COMMANDS]
     if needing:
-        said = run(bin_ / "whisker", needing[0], "--help").stderr
+        words = ["--trial", ros2_scene(tmp_path)] if needing[0] == "base" else ["--help"]
+        said = run(bin_ / "whisker", needing[0], *words).stderr
         assert f"pip install 'crunchbot[{extra}]'" in said, "it was needed"
     own = ["--find-links", DIST] if remedy.startswith("crunchbot-") or extra == "lab" else []
     pip(bin_ / "python", "install", "-q", "--no-index", *own, "--find-links", house, remedy)
