@@ -101,6 +101,24 @@ static void a_silence_that_is_noticed_ends_the_motion(void **state)
     assert_driven_until(HEARD_MS + BASE_SILENCE_MS);
 }
 
+/* The log has just said that they stand: it takes that back as early as without the orders. */
+static void a_silence_counts_from_the_last_frame_whatever_is_ordered(void **state)
+{
+    (void)state;
+    static const char *const orders[] = {"mode full", "mode safe", "mode passive", "stop"};
+    base_robot_watch(&robot, OPENED_MS + BASE_COMMANDER_MS);
+    assert_non_null(strstr(log_line, "wheels stopped"));
+    int64_t now_ms = OPENED_MS + BASE_COMMANDER_MS;
+    for (int i = 0; now_ms < HEARD_MS + BASE_SILENCE_MS; now_ms += CREATE_OI_PERIOD_MS, i++) {
+        say(commander, orders[i % 4], now_ms);
+        base_robot_watch(&robot, now_ms);
+        assert_int_equal(robot.silences, 0);
+    }
+    base_robot_watch(&robot, HEARD_MS + BASE_SILENCE_MS);
+    assert_int_equal(robot.silences, 1);
+    assert_non_null(strstr(log_line, "the wheels may turn"));
+}
+
 /* The wheels stood from the first stop on, whichever client says it again. */
 static void a_stop_said_again_changes_nothing(void **state)
 {
@@ -119,6 +137,7 @@ static void a_stop_that_was_not_written_was_not_heard(void **state)
     close(line);
     say(commander, "drive 0 0", ORDERED_MS);
     assert_int_equal(robot.port, -1);
+    assert_non_null(strstr(log_line, "Broken pipe; the wheels may turn; plug it in again"));
     assert_true(base_robot_open(&robot, pair(SOCK_STREAM, &line), BACK_MS));
     assert_driven_until(BACK_MS);
 }
@@ -135,6 +154,7 @@ int main(void)
         SILENCE(a_commander_that_goes_ends_the_motion),
         SILENCE(the_drivers_own_stops_end_the_motion),
         SILENCE(a_silence_that_is_noticed_ends_the_motion),
+        SILENCE(a_silence_counts_from_the_last_frame_whatever_is_ordered),
         SILENCE(a_stop_said_again_changes_nothing),
         SILENCE(a_stop_that_was_not_written_was_not_heard),
     };

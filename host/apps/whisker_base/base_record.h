@@ -104,7 +104,9 @@ struct base_robot {
     bool unseen;            /* it was not heard for a while: it may have been moved */
     bool silent;            /* it was heard, and then no more: until a frame comes the wheels stay stopped */
     unsigned held;          /* bits of enum base_hold: while one is set the wheels stay stopped */
-    int64_t drive_ms, opened_ms;
+    int64_t drive_ms;
+    int64_t opened_ms;     /* when frames were asked for last */
+    int64_t quiet_ms;      /* when it last sent what it was asked for; or since when this silence is waited for */
     int64_t frame_ms;      /* when the newest frame was said, at the latest: what has waited to be read is older */
     int64_t heard_ms;      /* when it was said, at the earliest */
     int64_t emptied_ms;    /* when nothing was left to read */

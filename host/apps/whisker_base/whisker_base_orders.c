@@ -24,7 +24,8 @@ void base_orders_drop_opcode(struct base_robot *robot)
 
 void base_orders_lose(struct base_robot *robot, const char *doing)
 {
-    base_log(&robot->log.line, LOG_WARN, "%s: %s: %s; plug it in again", robot->options->port, doing, strerror(errno));
+    base_log(&robot->log.line, LOG_WARN, "%s: %s: %s; the wheels may turn; plug it in again", robot->options->port,
+             doing, strerror(errno));
     create_port_close(robot->port);
     robot->port = -1;
     robot->sent = 0;

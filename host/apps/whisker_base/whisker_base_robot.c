@@ -95,6 +95,7 @@ bool base_robot_open(struct base_robot *robot, int port, int64_t now_ms)
     robot->frame = (struct create_frame){0};
     daemon_log(LOG_DETAIL, "%s: open, %s at %u baud", robot->options->port,
                create_model_facts(robot->options->odometry.model)->name, robot->options->baud);
+    robot->quiet_ms = now_ms;
     base_request(robot, now_ms);
     return robot->port >= 0;
 }
@@ -119,21 +120,16 @@ static void whisker_base_robot_stop_commander(struct base_robot *robot, int64_t 
     base_log(&robot->log.commander, LOG_WARN, "the commander is silent; %s", base_robot_fate(robot));
 }
 
-/* Since when the base is silent: the newest frame that it was asked for, or when it was asked. */
-static int64_t whisker_base_robot_heard_ms(const struct base_robot *robot)
-{
-    return robot->answered && robot->heard_ms > robot->opened_ms ? robot->heard_ms : robot->opened_ms;
-}
-
 /* So many frames at once, and too few for the time since the one before: the line may have held them, and the base have
  * said nothing since. */
-static void whisker_base_robot_note_heard(struct base_robot *robot, int64_t before_ms, int64_t frames)
+static void whisker_base_robot_note_heard(struct base_robot *robot, int64_t before_ms, int64_t frames, bool asked)
 {
     const bool goes_on = robot->frame_ms - before_ms < CREATE_OI_PERIOD_MS / 2;
     const int64_t least_ms = (goes_on ? robot->heard_ms : before_ms) + frames * CREATE_OI_PERIOD_MS;
     if (frames > 0) {
         robot->heard_ms = robot->frame_ms - least_ms > LATE_MS ? least_ms : robot->frame_ms;
     }
+    robot->quiet_ms = asked && robot->heard_ms > robot->quiet_ms ? robot->heard_ms : robot->quiet_ms;
 }
 
 static bool whisker_base_robot_moving(const struct base_robot *robot)
@@ -251,6 +247,7 @@ bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
     uint8_t bytes[READ_BYTES];
     const int64_t before_ms = robot->frame_ms;
     int64_t frames = 0;
+    bool any_asked = false;
     for (int reads = 0; reads < READS && robot->port >= 0; reads++) {
         const uint64_t left = limit - base_robot_taken(robot);
         const size_t room = left < sizeof bytes ? (size_t)left : sizeof bytes;
@@ -267,6 +264,7 @@ bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
             whisker_base_robot_look_at(robot, bytes[i]);
             const bool asked = create_stream_push(&robot->stream, bytes[i], &robot->frame);
             robot->answered |= asked;
+            any_asked |= asked;
             if (asked || (!robot->answered && robot->before.length > 0 &&
                           create_stream_push(&robot->before, bytes[i], &robot->frame))) {
                 whisker_base_robot_take_frame(robot, now_ms);
@@ -277,7 +275,7 @@ bool base_robot_read(struct base_robot *robot, uint64_t limit, int64_t now_ms)
             break;
         }
     }
-    whisker_base_robot_note_heard(robot, before_ms, frames);
+    whisker_base_robot_note_heard(robot, before_ms, frames, any_asked);
     robot->emptied_ms = now_ms;
     return robot->port >= 0;
 }
@@ -373,17 +371,16 @@ static const char *whisker_base_robot_cause(const struct base_unframed *unframed
 }
 
 /* A line that stays silent is reported once, again when what comes tells more than nothing did, and then every hour. */
-static void whisker_base_robot_log_silence(struct base_robot *robot, const struct base_unframed *unframed,
-                                           int64_t silence_ms, int64_t now_ms)
+static void whisker_base_robot_log_silence(struct base_robot *robot, const struct base_unframed *came, int64_t now_ms)
 {
-    const bool tells_more = robot->reported_nothing && unframed->all > 0;
+    const bool tells_more = robot->reported_nothing && came->all > 0;
     if (robot->reported_ms == 0 || tells_more || now_ms - robot->reported_ms >= BASE_TELL_MS) {
         robot->reported_ms = now_ms;
-        robot->reported_nothing = unframed->all == 0;
+        robot->reported_nothing = came->all == 0;
         base_log(&robot->log.silence, LOG_WARN,
-                 "%s: no frame for %lld ms: %s; ordered to stop, but the wheels may turn; asked "
-                 "again every %d ms",
-                 robot->options->port, (long long)silence_ms, whisker_base_robot_cause(unframed), BASE_SILENCE_MS);
+                 "%s: no frame for %lld ms: %s; ordered to stop, but the wheels may turn; asked again every %d ms",
+                 robot->options->port, (long long)(now_ms - robot->quiet_ms), whisker_base_robot_cause(came),
+                 BASE_SILENCE_MS);
     }
 }
 
@@ -396,11 +393,11 @@ static void whisker_base_robot_restart_stream(struct base_robot *robot, int64_t 
     robot->silent = true;
     robot->phase_frames = 0;
     const struct base_unframed unframed = robot->unframed;
-    const int64_t silence_ms = now_ms - whisker_base_robot_heard_ms(robot);
     robot->told_mm_s = robot->recalls == 0 ? robot->written.right_mm_s : robot->told_mm_s;
     robot->repeated = false;
     base_request(robot, now_ms);
-    whisker_base_robot_log_silence(robot, &unframed, silence_ms, now_ms);
+    whisker_base_robot_log_silence(robot, &unframed, now_ms);
+    robot->quiet_ms = now_ms;
 }
 
 /* How long a base may say nothing. */
@@ -440,7 +437,7 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
     if (whisker_base_robot_moving(robot) && now_ms - robot->drive_ms >= BASE_COMMANDER_MS) {
         whisker_base_robot_stop_commander(robot, now_ms);
     }
-    if (now_ms - whisker_base_robot_heard_ms(robot) >= whisker_base_robot_patience_ms(robot)) {
+    if (now_ms - robot->quiet_ms >= whisker_base_robot_patience_ms(robot)) {
         whisker_base_robot_restart_stream(robot, now_ms);
     }
     if (robot->silent && !robot->recalled && now_ms - robot->opened_ms >= ANSWER_MS &&
@@ -450,9 +447,9 @@ int base_robot_watch(struct base_robot *robot, int64_t now_ms)
     if (!robot->answered && !robot->repeated && robot->unframed.own > OWN_FRAMES) {
         base_repeat(robot, now_ms);
     }
-    const int64_t quiet_ms = now_ms - whisker_base_robot_heard_ms(robot);
-    const bool strange = robot->unframed.all > 0 && quiet_ms < ASTRAY_MS;
-    const int64_t silence_ms = (strange ? ASTRAY_MS : BASE_SILENCE_MS) - quiet_ms;
+    const int64_t passed_ms = now_ms - robot->quiet_ms;
+    const bool strange = robot->unframed.all > 0 && passed_ms < ASTRAY_MS;
+    const int64_t silence_ms = (strange ? ASTRAY_MS : BASE_SILENCE_MS) - passed_ms;
     const int64_t commander_ms =
         whisker_base_robot_moving(robot) ? robot->drive_ms + BASE_COMMANDER_MS - now_ms : silence_ms;
     return (int)base_orders_due_ms(

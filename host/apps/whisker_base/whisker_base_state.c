@@ -148,7 +148,7 @@ void base_recall(struct base_robot *robot, int64_t now_ms)
     robot->cut_count = 0;
     base_orders_write(robot, bytes, count);
     robot->recalled = robot->port >= 0;
-    robot->opened_ms = now_ms + RECALL_MS - BASE_SILENCE_MS;
+    robot->opened_ms = robot->quiet_ms = now_ms + RECALL_MS - BASE_SILENCE_MS;
 }
 
 void base_recall_end(struct base_robot *robot)

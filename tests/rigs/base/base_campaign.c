@@ -394,7 +394,7 @@ static void judge_wheels(void)
 static void judge_log(void)
 {
     const bool driven = robot.speeds.left_mm_s != 0 || robot.speeds.right_mm_s != 0;
-    stands_ms = driven || robot.port < 0 ? 0 : stands_ms; /* a line that is gone is reported as such */
+    stands_ms = driven ? 0 : stands_ms;
     stood_ms = turning() ? stood_ms : now_ms;
     const int64_t since_ms = heard_ms < stands_ms ? heard_ms : stands_ms > stood_ms ? stands_ms : stood_ms;
     if (turning() && stands_ms > 0 && now_ms - since_ms > BELIEVED_MS && now_ms > driver_ms + MARGIN_MS) {
