@@ -3,13 +3,17 @@
 No test waits by the clock: each waits for bytes on the line, for an answer, or for the end of a process.
 """
 
+import ctypes
+import fcntl
 import math
 import os
+import pty
 import resource
 import signal
 import socket
 import subprocess
 import sys
+import termios
 import time
 from pathlib import Path
 
@@ -33,6 +37,7 @@ from crunchbot.pilot import base
 from crunchbot.pilot.base import BaseError, BaseLost
 from crunchbot.programs import program
 
+SILENCES = 100  # by the driver's count: more than it needs to tell the cause of one
 ENDED = STOP + bytes([PAUSE, 0, START])  # last words: stopped, silent, passive
 
 
@@ -622,8 +627,8 @@ def test_messages_that_are_none_are_refused(start):
         assert client.drive(0.2, 0.0).v_m_s == 0.2
 
 
-def refused(*words, env=None) -> tuple[int, str]:
-    done = subprocess.run([program("whisker-base"), *map(str, words)], capture_output=True, text=True, env=env)
+def refused(*words, **more) -> tuple[int, str]:
+    done = subprocess.run([program("whisker-base"), *map(str, words)], capture_output=True, text=True, **more)
     assert done.stderr.count("\n") == 1, done.stderr
     return done.returncode, done.stderr
 
@@ -653,6 +658,23 @@ def test_two_drivers_do_not_share_a_base(start, tmp_path):
     assert (code, "another process drives it" in text) == (1, True), text
     code, text = refused("--port", driver.peer.link, "--socket", driver.socket)
     assert (code, "stop the whisker-base that has it" in text) == (1, True), text
+
+
+def test_a_port_that_a_program_has_for_itself_is_refused(tmp_path):
+    """As a terminal program or ModemManager does (TIOCEXCL), which has no lock that a driver would see."""
+    base_end, other = pty.openpty()
+    fcntl.ioctl(other, termios.TIOCEXCL)
+    code, text = refused("--port", os.ttyname(other), "--socket", tmp_path / "s", preexec_fn=be_no_superuser)
+    assert (code, "has it for itself, as a terminal program or ModemManager; end that" in text) == (1, True), text
+    fcntl.ioctl(other, termios.TIOCNXCL)
+    os.close(other)
+    os.close(base_end)
+
+
+def be_no_superuser() -> None:
+    """What is started by this process opens no port that another has for itself."""
+    drop_from_bounding_set, sys_admin = 24, 21  # linux/prctl.h, linux/capability.h
+    ctypes.CDLL(None).prctl(drop_from_bounding_set, sys_admin, 0, 0, 0)
 
 
 def test_a_socket_is_made_where_nothing_else_is(start, tmp_path):
@@ -733,10 +755,11 @@ def test_why_a_base_is_silent(start, tmp_path):
         (tmp_path / str(number)).mkdir()
         driver = Driver(tmp_path / str(number), *options)
         driver.peer.await_start()
-        while cause not in driver.log.read_text():
-            assert driver.process.poll() is None, driver.log.read_text()
-            driver.peer.tell(data)  # as such a base does, again and again
-            time.sleep(0.1)
+        with driver.client() as client:
+            while cause not in (said := driver.log.read_text()):
+                assert int(client.health()["silences"]) < SILENCES, said
+                driver.peer.tell(data)  # as such a base does, again and again
+                time.sleep(0.1)
         driver.close()
 
 
