@@ -39,12 +39,15 @@ class RosBag:
                 yield Message(connection.topic, at_ns, data)
 
     def decoded(self, message: Message) -> Any:
-        """The message, by ROS 2's types and those in the bag."""
+        """The message, by ROS 2's types and those in the bag; ValueError: its bytes are damaged."""
         kind, described = self.topics[message.topic].msgtype, self.topics[message.topic].msgdef
-        with self._readable(f"no {kind} on {message.topic}"):
-            if kind not in self._store.fielddefs:
+        if kind not in self._store.fielddefs:
+            with self._readable(f"no {kind} on {message.topic}"):
                 self._store.register(get_types_from_msg(described.data, kind))
+        try:
             return self._store.deserialize_cdr(message.data, kind)
+        except Exception as error:  # those of what unpacks it come as they are
+            raise ValueError(f"no {kind} can be read") from error
 
     @contextmanager
     def _readable(self, fault: str) -> Iterator[None]:

@@ -5,6 +5,7 @@ The bag's times count, not those in the messages, which may be of several clocks
 """
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...files import UnreadableError, read_toml
+from ...nav.faults import LEFT_MOST
 from ...observation import EXPLORING, Quantity, Row
 from ...pilot.pilot import compose
 from ...recording.rosbag import RosBag
@@ -70,9 +72,17 @@ def read_by_table(path: Path, table: Path, scene: Scene | None) -> Played:
     with RosBag(path) as bag:
         if missing := {source.topic for source in sources.values()} - bag.topics.keys():
             raise BagError(f"{path}: no topic {min(missing)}; it has {', '.join(sorted(bag.topics))}")
+        count, damaged = Counter[str](), Counter[str]()
         for message in bag.messages():
             columns = [column for column, source in sources.items() if source.topic == message.topic]
-            decoded = bag.decoded(message) if columns else None
+            if not columns:
+                continue
+            count[message.topic] += 1
+            try:
+                decoded = bag.decoded(message)
+            except ValueError:
+                damaged[message.topic] += 1
+                continue
             if hasattr(decoded, "position"):
                 joints.setdefault(message.topic, set()).update(decoded.name)
             for column in columns:
@@ -81,6 +91,11 @@ def read_by_table(path: Path, table: Path, scene: Scene | None) -> Played:
                     cells[column].append((message.log_time, read(decoded)))
                 except ValueError as error:
                     raise BagError(f"{path}: {message.topic}: {error}") from None
+        for topic, left in damaged.items():
+            if left == count[topic]:
+                raise BagError(f"{path}: {topic}: no message of {left} can be read; give another bag, or another topic")
+            if left > LEFT_MOST * count[topic]:
+                bag.note(f"{topic}: {left} of {count[topic]} messages are damaged and left out; look what wrote them")
         for source in sources.values():
             if source.joint not in (known := joints.get(source.topic, {source.joint})):
                 raise BagError(f"{path}: {source.topic}: no joint '{source.joint}'; it has {', '.join(sorted(known))}")

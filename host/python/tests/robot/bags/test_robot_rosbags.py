@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from commandkit import run, signals_as_before  # noqa: F401 - a fixture
 from robotkit import to_rows
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from crunchbot.nav import localise
@@ -283,6 +283,30 @@ def test_gaps_and_what_says_nothing_are_reported(tmp_path, table, capsys):
     ]
     rows = rows_of(tmp_path / "a")
     assert rows.odometry[:, 2].sum() == pytest.approx(TURN * 3.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_damaged_messages_are_left_out_and_many_are_reported(tmp_path, table, capsys, storage):
+    types, options = get_typestore(Stores.ROS2_JAZZY), ("--scene", tmp_path / "own", "--topics", table)
+    with Reader(ordinary(tmp_path / "whole", storage)) as reader:
+        said = [(one.topic, one.msgtype, at_ns, bytes(data)) for one, at_ns, data in reader.messages()]
+    for text in GZ.items():
+        types.register(get_types_from_msg(text[1], text[0]))
+    for name, topic, each in (("one", "/odom", 31), ("many", "/range", 5), ("all", "/odom", 1)):
+        with Writer(tmp_path / name, version=9, storage_plugin=STORAGES[storage]) as writer:
+            known, count = {}, 0
+            for at, kind, at_ns, data in said:
+                if at not in known:
+                    known[at] = writer.add_connection(at, kind, typestore=types)
+                count += at == topic
+                writer.write(known[at], at_ns, data[:9] if at == topic and count % each == 0 else data)
+        code, _, err = run(capsys, "scene", "from", tmp_path / name, *options, "--out", tmp_path / f"of_{name}")
+        if name == "all":
+            assert code == 2 and "/odom: no message of 61 can be read; give another bag" in err
+            continue
+        assert code == 0 and len(rows_of(tmp_path / f"of_{name}")) == 30
+        wanted = "/range: 9 of 46 messages are damaged and left out; look what wrote them"
+        assert (wanted in err) == (name == "many") and (name == "many" or err == "")
 
 
 def test_rows_without_a_message_are_not_read_and_counted(tmp_path, table, capsys):
