@@ -283,19 +283,24 @@ static bool turning(void)
     return fabs(left_mm_s) > 0.5 || fabs(right_mm_s) > 0.5;
 }
 
+/* What health says at the end of this millisecond, from when on nothing but the judgement asks. */
 static const char *health_of(const char *key)
 {
-    static char text[1100];
+    static char text[1100], value[40];
+    static int64_t text_ms;
     char name[40];
-    base_robot_health(&robot, text, sizeof text);
+    if (text_ms != now_ms) {
+        base_robot_health(&robot, text, sizeof text);
+        text_ms = now_ms;
+    }
     snprintf(name, sizeof name, "%s=", key);
-    char *found = strstr(text, name);
+    const char *found = strstr(text, name);
     while (found && found != text && found[-1] != ' ') {
         found = strstr(found + 1, name);
     }
-    found = found ? found + strlen(name) : text + strlen(text);
-    found[strcspn(found, " ")] = '\0';
-    return found;
+    found = found ? found + strlen(name) : "";
+    snprintf(value, sizeof value, "%.*s", (int)strcspn(found, " "), found);
+    return value;
 }
 
 /* A base whose line has another speed, by an order that was spoilt, hears no order until it is called at that speed. */
