@@ -16,7 +16,7 @@ from whisker_protocol import CODES, LIMITS, STATUS_CODE_SHIFT
 
 HIL = Path(__file__).resolve().parents[1] / "hil"
 sys.path.insert(0, str(HIL))
-from base_checks import SILENT_FRAMES, await_stop  # noqa: E402
+from base_checks import SILENT_FRAMES, await_said, await_stop  # noqa: E402
 from bridge_checks import judge_clock  # noqa: E402
 from bridge_rig import SETTLE_TICKS, Rig, Stream  # noqa: E402
 from checks import CheckError, SkipError  # noqa: E402
@@ -151,6 +151,20 @@ def test_a_base_that_drives_on_is_no_good_after_half_a_second():
     with pytest.raises(CheckError, match=r"the wheels turn on 0\.495 s after the last order; switch the base off"):
         await_stop(base, "the last order")
     assert base.frames <= 6 * SILENT_FRAMES
+
+
+class Asked:
+    """A base that says nothing of itself until it has heard what it was asked anew."""
+
+    def __init__(self):
+        self.said = iter(["unknown", "unknown", "14000"])
+
+    def health(self) -> dict[str, str]:
+        return {"voltage_mv": next(self.said)}
+
+
+def test_of_a_base_that_is_asked_anew_the_voltage_is_waited_for():
+    assert await_said(Asked(), "voltage_mv") == {"voltage_mv": "14000"}
 
 
 def test_a_bridge_without_nodes_is_reported_from_a_bad_one(alone, tmp_path):

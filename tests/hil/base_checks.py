@@ -96,6 +96,19 @@ def await_frames(base: Base, frames: int) -> None:
     until(lambda: count(base, "frames") >= end, SILENCE_S, lambda: count(base, "frames"), text)
 
 
+def await_said(base: Base, key: str) -> dict[str, str]:
+    """The health of a base that has said this; while it is asked anew it is "unknown", and so is all that it says."""
+    said = []
+
+    def tried() -> bool:
+        said.append(base.health())
+        return said[-1][key] != "unknown"
+
+    text = f"it has not said its {key} for {SILENCE_S:g} s; check the wire to the base"
+    until(tried, SILENCE_S, lambda: None, text)
+    return said[-1]
+
+
 # ------------------------------------------------------------------------------------------------------------- checks
 
 
@@ -116,7 +129,7 @@ def voltage(rig: Rig) -> str:
     """The battery is neither low nor absurd."""
     with rig.base() as base:
         await_frames(base, 1)
-        health = base.health()
+        health = await_said(base, "voltage_mv")
     volts = int(health["voltage_mv"]) / 1000
     text = f"{volts:.1f} V, {health['charge_mah']} of {health['capacity_mah']} mAh"
     require(VOLTS[0] <= volts <= VOLTS[1], f"{text}: not within {VOLTS[0]:g} to {VOLTS[1]:g} V; charge it, or --model")
