@@ -26,7 +26,7 @@ from crunchbot.touch.contact import Contact
 from crunchbot.touch.contact_filter import ContactFilter
 from crunchbot.touch.radial.curve import peak
 from crunchbot.touch.radial.model import RadialModel
-from crunchbot.touch.texture.classifier import Classifier, blocks_of, plain_features
+from crunchbot.touch.texture.classifier import Classifier, Reducer, blocks_of, plain_features
 from crunchbot.touch.texture.model import TextureModel
 from crunchbot.touch.texture.novelty import Novelty
 from crunchbot.touch.texture.spectral import forward
@@ -40,6 +40,7 @@ OWN = {
     "nav.filters.problem_of",
     "nav.mapper.OneMap._grid",
     "nav.mapper.OneMap._listed",
+    "touch.texture.change.Apart.take",
     "signals.world.World.run",
     "signals.mechanics._counts",
     "signals.mechanics.touch",
@@ -145,6 +146,9 @@ CASES = {
         {"windows": np.zeros((2, LENGTH, CHANNELS)), "floor": np.ones(CHANNELS), "shape": np.zeros(SHAPES)},
         {"windows": (2,), "floor": (0,), "shape": (0,)},
     ),
+    "touch.texture.classifier.Reducer.features": of_one(
+        Reducer(np.ones(CHANNELS), LENGTH).features, "window", np.zeros((LENGTH, CHANNELS)), 0, 1
+    ),
     "touch.texture.classifier.blocks_of": of_one(
         lambda samples: blocks_of(samples, LENGTH, CHANNELS), "samples", NOISE, 1
     ),
@@ -155,7 +159,7 @@ CASES = {
     "bridge.ring.Writer.publish": of_one(published, "frames", np.zeros(3, FRAME)),
 }
 CASES["touch.texture.classifier.pointers"] = CASES["touch.texture.classifier.Classifier._make"]
-CASES["touch.texture.classifier._reducer"] = CASES["touch.texture.classifier.plain_features"]
+CASES["touch.texture.classifier.Reducer.__init__"] = CASES["touch.texture.classifier.plain_features"]
 
 
 def sources() -> dict[str, Path]:

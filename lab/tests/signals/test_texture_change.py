@@ -9,7 +9,8 @@ from crunchbot import scene as scenes
 from crunchbot.cli import main
 from crunchbot.touch.floor import CHANGE_WINDOWS, WINDOW_SAMPLES, floor_whisker
 from crunchbot.touch.texture import model as texture
-from crunchbot.touch.texture.change import FASTER, notice, windows_of
+from crunchbot.touch.texture.change import FASTER, GAINS, TURNS, Watch, notice, windows_of
+from crunchbot.touch.texture.classifier import Reducer
 from crunchbot.touch.texture.novelty import of_one_in_a_thousand
 
 SPEED_M_S = 0.15
@@ -76,6 +77,32 @@ def test_a_pilots_whisker_names_it_once_after_a_few_seconds(learnt):
             whisker.look(window)
             assert n >= CHANGE_WINDOWS - 1 or not whisker.changed
         assert whisker.changed.split(":")[0] == cause
+
+
+def test_a_window_costs_a_pilot_one_look_and_one_for_each_cause_while_they_are_sought(monkeypatch, learnt):
+    """A block of a pilot is 20 ms; a look is 20 us of C. Windows thrown out together would be as many looks in one block."""
+    looks, work = [], Reducer.features
+    monkeypatch.setattr(Reducer, "features", lambda self, window: looks.append(self) or work(self, window))
+    model = texture.load(learnt)
+    counts = wander(floor_scene(1, seed=6), 8, 20.0, SPEED_M_S)[0][:, 0].astype(float)
+    for change, most in ((lambda x: x, 1), (lambda x: turned(x, 40.0), 1 + len(GAINS) + len(TURNS))):
+        whisker, each = floor_whisker(model, np.random.default_rng(0)), []
+        for window in change(counts).reshape(-1, WINDOW_SAMPLES, 2):
+            looks.clear()
+            whisker.look(window)
+            each.append(len(looks))
+        assert max(each) == most and bool(whisker.changed) == (most > 1)
+        assert not whisker.changed or each[-1] == 0
+
+
+def test_a_watch_that_is_far_once_and_then_near_says_nothing(learnt):
+    model = texture.load(learnt)
+    near = windows_of(model, wander(floor_scene(1, seed=6), 8, 20.0, SPEED_M_S)[0][:, 0].astype(float))[:64]
+    far, watch = np.array([turned(window, 40.0) for window in near]), Watch(model, len(near))
+    for windows, named in ((far, ""), (near, ""), (far, ""), (far, "mount")):
+        for window in windows:
+            watch.take(window)
+        assert watch.line.split(":")[0] == named
 
 
 def test_few_windows_or_a_model_that_does_not_know_say_nothing(learnt):

@@ -1,11 +1,10 @@
 """What a floor whisker says of a window: by the paper's classifier, about a rest that is followed, or by the spectral one."""
 
-from collections import deque
 from typing import Any
 
 import numpy as np
 
-from .texture.change import notice
+from .texture.change import Watch, knows
 from .texture.spectral import SpectralModel
 
 STEP_COUNTS = 16.0  # MLX90333: 12 bits of angle in a 16-bit word (data sheet, front page)
@@ -72,10 +71,9 @@ class SpectralFloorWhisker:
     def __init__(self, model: SpectralModel):
         self.model = model
         self.silent = False  # whether the last window had no evidence, as during a catch
-        self.changed = ""  # a line where whisker, mount or speed are not the model's
         self._stream = model.stream(WINDOW_SAMPLES)
-        self._known = model.novelty is not None and model.novelty.length == WINDOW_SAMPLES
-        self._windows: deque[np.ndarray] = deque(maxlen=CHANGE_WINDOWS)
+        known = knows(model) and model.novelty.length == WINDOW_SAMPLES
+        self._watch = Watch(model, CHANGE_WINDOWS) if known else None
 
     def follow(self, samples: np.ndarray) -> None:
         """Spectra are of differences: a drifting rest is not in them."""
@@ -85,16 +83,14 @@ class SpectralFloorWhisker:
         a surface never trained."""
         (found,) = self._stream.push(window)
         self.silent = found.confidence == 0.0
-        if not self.silent and np.isfinite(window).all():
-            self._windows.append(window)
-            self._notice()
+        if self._watch and not self.silent and np.isfinite(window).all():
+            self._watch.take(window)
         return found.loglik if not self.silent and found.novelty <= 1.0 else None
 
-    def _notice(self) -> None:
-        """Once, of whole batches of windows: what is changed is sought among many ways, which takes a while."""
-        if len(self._windows) == CHANGE_WINDOWS and not self.changed and self._known:
-            self.changed = notice(self.model, np.array(self._windows))
-            self._windows.clear()
+    @property
+    def changed(self) -> str:
+        """A line where whisker, mount or speed are not the model's."""
+        return self._watch.line if self._watch else ""
 
     def pause(self) -> None:
         """The next window does not follow the last."""

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from crunchbot.touch.texture.classifier import Classifier, feature_count
+from crunchbot.touch.texture.classifier import Classifier, Reducer
 from crunchbot.touch.texture.novelty import ROW, Novelty
 from crunchbot.touch.texture.spectral import SpectralModel
 
 CHANNELS, LENGTH, CLASSES = 2, 64, 3
-FEATURES = feature_count(np.ones(CHANNELS), LENGTH)
+FEATURES = Reducer(np.ones(CHANNELS), LENGTH).count
 LIMITS = {"spike": [9.0, 9.0], "still": [1.0, 1.0], "low": [0.0, 0.0], "high": [65535.0, 65535.0]}
 LIMITS = {name: np.array(values) for name, values in LIMITS.items()}
 

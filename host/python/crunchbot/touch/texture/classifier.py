@@ -36,7 +36,7 @@ class Classifier:
         return self._made
 
     def _make(self):
-        features = feature_count(self.floor, self.length, self.shape)
+        features = Reducer(self.floor, self.length, self.shape).count
         shapes = {"floor": self.floor.shape, "bias": self.bias.shape, "weight": (features, len(self.bias))}
         shapes |= {"shape": self.shape.shape} if len(self.shape) else {}
         where, sizes = f"classifier {self.length}", {"classes": len(self.bias), "channels": len(self.floor)}
@@ -59,33 +59,33 @@ def made(kind: str, numbers: dict, where: str) -> ffi.CData:
     return ffi.gc(found, getattr(lib, f"nav_texture_{kind}_free"))
 
 
-def _reducer(floor: np.ndarray, length: int, shape: np.ndarray):
-    """The C features of a window; ValueError for a size out of range."""
-    channels, floor = len(floor), as_doubles(floor, "floor", (len(floor),))
-    if len(shape) not in (0, lib.nav_texture_shape_count(length)):
-        raise ValueError(f"texture: {len(shape)} thresholds of shape for windows of {length} samples")
-    thresholds = doubles(as_doubles(shape, "shape", shape.shape), "shape", shape.shape) if len(shape) else ffi.NULL
-    made = lib.nav_texture_features_new(channels, length, doubles(floor, "floor", floor.shape), thresholds)
-    if made == ffi.NULL:
-        raise ValueError(f"texture: {channels} channels in windows of {length} samples are out of range")
-    return ffi.gc(made, lib.nav_texture_features_free)
+class Reducer:
+    """Reduces windows of `length` samples to `count` numbers; ValueError for a size out of range."""
 
+    def __init__(self, floor: np.ndarray, length: int, shape: np.ndarray = NONE):
+        channels, floor = len(floor), as_doubles(floor, "floor", (len(floor),))
+        if len(shape) not in (0, lib.nav_texture_shape_count(length)):
+            raise ValueError(f"texture: {len(shape)} thresholds of shape for windows of {length} samples")
+        thresholds = doubles(as_doubles(shape, "shape", shape.shape), "shape", shape.shape) if len(shape) else ffi.NULL
+        made = lib.nav_texture_features_new(channels, length, doubles(floor, "floor", floor.shape), thresholds)
+        if made == ffi.NULL:
+            raise ValueError(f"texture: {channels} channels in windows of {length} samples are out of range")
+        self._made, self._window = ffi.gc(made, lib.nav_texture_features_free), (length, channels)
+        self.count = lib.nav_texture_features_count(self._made)
 
-def feature_count(floor: np.ndarray, length: int, shape: np.ndarray = NONE) -> int:
-    """Numbers that a window is reduced to; ValueError for a size out of range."""
-    return lib.nav_texture_features_count(_reducer(floor, length, shape))
+    def features(self, window: np.ndarray) -> np.ndarray:
+        """Window (length, channels) -> features (count,)."""
+        out = np.empty(self.count)
+        given = doubles(as_doubles(window, "window", self._window), "window", self._window)
+        lib.nav_texture_features_work(self._made, given, doubles(out, "features", out.shape))
+        return out
 
 
 def plain_features(windows: np.ndarray, floor: np.ndarray, shape: np.ndarray = NONE) -> np.ndarray:
     """Windows (m, length, channels) -> features (m, F); as in nav_texture_features_new."""
     windows = as_doubles(windows, "windows", (None, None, len(floor)))
-    made = _reducer(floor, windows.shape[1], shape)
-    out = np.empty((len(windows), lib.nav_texture_features_count(made)))
-    for window, row in zip(windows, out, strict=True):
-        lib.nav_texture_features_work(
-            made, doubles(window, "window", windows.shape[1:]), doubles(row, "features", out.shape[1:])
-        )
-    return out
+    made = Reducer(floor, windows.shape[1], shape)
+    return np.array([made.features(window) for window in windows]).reshape(-1, made.count)
 
 
 def shape_thresholds(windows: np.ndarray, floor: np.ndarray) -> np.ndarray:
