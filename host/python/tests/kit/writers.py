@@ -209,7 +209,7 @@ def child(work: Callable[[], int]) -> tuple[int, int]:
 
 
 def try_all(case: Case, folder: Path) -> dict:
-    """The case ended at each operation, or at sixty of many, and failed at six."""
+    """The case ended at each operation, or at two hundred of many, and failed at six."""
 
     def fresh() -> Path:
         shutil.rmtree(folder / "try", ignore_errors=True)
@@ -223,7 +223,7 @@ def try_all(case: Case, folder: Path) -> dict:
     if code or new in (None, old):
         return {"operations": 0, "lost": [f"without a fault: exit code {code}"]}
     for way, error in WAYS.items():
-        for at in range(1, operations + 1, 1 + operations // (6 if error else 60)):
+        for at in range(1, operations + 1, 1 + operations // (6 if error else 200)):
             place = fresh()
             code, _ = child(
                 lambda at=at, error=error, place=place: (injector.arm(folder / "try", at, error), case.run(place))[1]
