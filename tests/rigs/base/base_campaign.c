@@ -1032,6 +1032,7 @@ static void print_failure(uint64_t number)
                (long long)(faults[i].to_ms - BEGIN_MS), kind_names[faults[i].kind], faults[i].value);
     }
     fputs(logged, stdout);
+    fflush(stdout); /* the journal will be past it */
 }
 
 static uint64_t read_journal(const char *path, uint64_t first)
@@ -1084,7 +1085,8 @@ int main(int argc, char **argv)
             return 1;
         }
     }
-    for (uint64_t number = read_journal(journal, first); number < end; number++) {
+    const uint64_t begun = read_journal(journal, first);
+    for (uint64_t number = begun; number < end; number++) {
         run_draw(number);
         if (why[0]) {
             failed++;
@@ -1098,7 +1100,7 @@ int main(int argc, char **argv)
     printf(
         "%llu draws, %u failed; 90 %% regions of the odometry held in %u of %u disturbed legs of Create 1, %u of %u of "
         "Create 2, %u of %u others\n",
-        (unsigned long long)(end - first), failed, within[0], measured[0], within[1], measured[1], within_clean,
-        measured_clean);
+        (unsigned long long)(end > begun ? end - begun : 0), failed, within[0], measured[0], within[1], measured[1],
+        within_clean, measured_clean);
     return failed > 0 || !covers(0) || !covers(1);
 }

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import termios
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -753,14 +754,13 @@ def test_why_a_base_is_silent(start, tmp_path):
         )
     ):
         (tmp_path / str(number)).mkdir()
-        driver = Driver(tmp_path / str(number), *options)
-        driver.peer.await_start()
-        with driver.client() as client:
-            while cause not in (said := driver.log.read_text()):
-                assert int(client.health()["silences"]) < SILENCES, said
-                driver.peer.tell(data)  # as such a base does, again and again
-                time.sleep(0.1)
-        driver.close()
+        with closing(Driver(tmp_path / str(number), *options)) as driver:
+            driver.peer.await_start()
+            with driver.client() as client:
+                while cause not in (said := driver.log.read_text()):
+                    assert int(client.health()["silences"]) < SILENCES, said
+                    driver.peer.tell(data)  # as such a base does, again and again
+                    time.sleep(0.1)
 
 
 def test_help_has_examples():
