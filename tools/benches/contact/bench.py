@@ -17,7 +17,13 @@ from .scenes import FRICTION, TICK_S, chained
 
 CONTACTS, WORD = 20, "judged"
 PROCESSORS = 2
-STORED = ("ellipse", "wedge, its edge on the shaft", "face, across the whisker", "short face, any angle")
+STORED = (
+    "ellipse",
+    "wedge, its edge on the shaft",
+    "face, across the whisker",
+    "short face, any angle",
+    "face, head-on",
+)
 DRAWS = ("number", "friction", "median mm", "worst mm", "held 90", "refused", "normal median deg", "normals taken")
 
 

@@ -524,6 +524,20 @@ static void a_corner_that_goes_along_with_the_shaft_is_caught(void **state)
     assert_near(a.arc_m, place, 3e-3);
 }
 
+static void the_share_of_a_push_along_the_whisker_is_reported(void **state)
+{
+    (void)state;
+    struct nav_contact_filter f = filter();
+    struct nav_contact_answer a;
+    for (int side = 1; side >= -1; side -= 2) {
+        struct course c = {corner_at(0.11), {0.03 * side, -0.04, 0.0}, {0}, 1, 7, 0.0};
+        drive(&f, &c, 200, 0);
+        nav_contact_filter_answer(&f, &a);
+        assert_near(a.along, side > 0 ? 0.6 : 0.0, 1e-6); /* drawn back, it does not push */
+        nav_contact_filter_begin(&f);
+    }
+}
+
 static void a_surface_reports_its_curvature(void **state)
 {
     (void)state;
@@ -556,6 +570,7 @@ int main(void)
         cmocka_unit_test(what_no_hypothesis_explains_is_none_of_them),
         cmocka_unit_test(an_object_is_followed_over_a_gap),
         cmocka_unit_test(a_corner_that_goes_along_with_the_shaft_is_caught),
+        cmocka_unit_test(the_share_of_a_push_along_the_whisker_is_reported),
         cmocka_unit_test(a_surface_reports_its_curvature),
         cmocka_unit_test(bad_samples_are_counted_and_not_read),
         cmocka_unit_test(whatever_comes_the_answers_are_finite),

@@ -442,6 +442,7 @@ void nav_contact_bank_step(struct nav_contact_filter *f, const struct nav_contac
     bank_normalise(f);
     f->driven_m += hypot(step->moved[0], step->moved[1]);
     f->turned_m += fabs(step->turned) * f->beam->tip * f->config.cone_m;
+    f->pushed_m += fmax(0.0, step->moved[0]);
 }
 
 static bool bank_same(const struct nav_contact_part *a, const struct nav_contact_part *b)

@@ -23,7 +23,7 @@ void nav_contact_filter_init(struct nav_contact_filter *f, const struct nav_cont
 void nav_contact_filter_begin(struct nav_contact_filter *f)
 {
     f->parts = f->filled = f->seen = f->equal = f->updates = 0;
-    f->side = f->turned_m = f->driven_m = 0.0;
+    f->side = f->turned_m = f->driven_m = f->pushed_m = 0.0;
     f->last[0] = f->last[1] = NAN;
     f->plane = 0.0;
     f->plane_variance = PLANE_SD * PLANE_SD;
@@ -241,6 +241,7 @@ void nav_contact_filter_answer(const struct nav_contact_filter *f, struct nav_co
     a->normal_rad *= f->side;
     a->plane_rad = atan(f->plane);
     a->plane_sd = sqrt(f->plane_variance) / (1.0 + f->plane * f->plane);
+    a->along = f->pushed_m > 0.0 ? f->pushed_m / (f->driven_m + f->turned_m) : 0.0;
     filter_speed(&moving, a);
     filter_motion(f, a);
 }

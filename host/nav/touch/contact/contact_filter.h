@@ -38,7 +38,8 @@ struct nav_contact_answer {
     double sweep, corner, tip, slip;        /* probabilities: it moves; its radius is below 5 mm; at the tip; slides */
     double friction, friction_sd;
     double curvature, curvature_sd; /* of the surface, 1/m, a corner's counted as 0 */
-    double other;                   /* probability that none of the hypotheses holds, as of a push along the whisker */
+    double other;                   /* probability that none of the hypotheses holds */
+    double along;                   /* share of the way since the touch that pushes along the whisker, 0 to 1 */
     int motion;                     /* enum nav_contact_motion */
     int parts;                      /* hypotheses left; 0: no contact yet, and nothing above is known */
 };

@@ -61,6 +61,7 @@ struct nav_contact_filter {
     double ring;                    /* square of the amplitude of ringing that may be left, rad^2 */
     double plane, plane_variance;   /* tilt of axis 1 over that of axis 0 */
     double turned_m, driven_m;      /* how far the base's turn and its drive have moved the contact */
+    double pushed_m;                /* how far of this along the whisker, towards its tip */
     uint64_t bad, stuck, saturated; /* samples not read */
     uint64_t restarts;              /* contacts that none of the hypotheses explained */
 };

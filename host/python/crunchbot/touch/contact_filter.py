@@ -37,6 +37,8 @@ POSITIVE = ("cone_m", "kappa", "creep_s", "noise_rad", "largest_rad", "ring_hz",
 LIMITS = {"friction": 0.5, "moving": 0.5, "caught": 0.3, "other": 0.1}
 TIPS = (0.3001, 0.8499)  # length over cone, just within the ends of the beam's tables (contact_beam.h)
 LEAST_SAMPLES = 100
+FORCE_MOST_RAD = 2.85  # of a force on the tip in the beam's table (contact_beam.h)
+NINETY = 1.645  # standard deviations to the ends of a 90 % interval
 MOTIONS = ("body whisk", "drive-by", "sweep")
 SURE = 0.9  # probability from which on something is said: a tip on a surface, a corner
 # Deviations up to which something is sure. In 118 contacts of chains regions of places held in 91 % of the reports up to 6 mm (n
@@ -78,13 +80,21 @@ class Reports(NamedTuple):
     friction_sd: np.ndarray
     curvature: np.ndarray  # of the surface, 1/m, a corner's counted as 0
     curvature_sd: np.ndarray
-    other: np.ndarray  # probability that none of the hypotheses holds, as of a push along the whisker
+    other: np.ndarray  # probability that none of the hypotheses holds
+    along: np.ndarray  # share of the way since the touch that pushes along the whisker
 
     @property
     def sure(self) -> np.ndarray:
         """(k,) Whether the point is known."""
         point_sd = np.sqrt(np.trace(self.point_cov, axis1=1, axis2=2) / 2.0)
-        return (self.other < 0.5) & (point_sd <= POINT_MOST_M)
+        return (self.other < 0.5) & (point_sd <= POINT_MOST_M) & ~self.columned
+
+    @property
+    def columned(self) -> np.ndarray:
+        """(k,) Whether the whisker may be bent as a column, which no hypothesis is: the push lies along it rather than
+        across, and the force, which leans from the normal by friction's angle at most, may lie beyond the beam's table."""
+        force = np.abs(self.normal_rad) + NINETY * self.normal_sd + np.arctan(LIMITS["friction"])
+        return (self.along > np.sqrt(0.5)) & (force > FORCE_MOST_RAD)
 
     @property
     def faced(self) -> np.ndarray:

@@ -68,12 +68,15 @@ def test_a_whisker_at_rest_gives_no_report_and_a_new_contact_forgets_the_last():
 # Chains of 20 links in MuJoCo against shapes met at any angle, friction 0.1 to 0.5 and not given; a row: mean tilts of 20
 # samples, the point and the normal in their middle. Made by `tools/benches contact --word work --each 8 --contacts FILE`.
 CHAINS = Path(__file__).parent / "chains.jsonl"
+HEAD_ON = "face, head-on"
 
 
-def chained() -> dict[str, np.ndarray]:
+def chained(head_on: bool) -> dict[str, np.ndarray]:
     """All reports from 0.1 s after the touch on: errors, whether 90 % regions hold, refused, taken by a pilot."""
     found: dict[str, list] = {name: [] for name in ("off_mm", "held", "turn_deg", "turn_held", "refused", "taken")}
     for contact in map(json.loads, CHAINS.read_text().splitlines()):
+        if (contact["kind"] == HEAD_ON) != head_on:
+            continue
         rows = np.array(contact["rows"])
         held = ContactFilter(creep=0.0, block=1, sample_s=20 * TICK_S, noise_rad=2e-4 / np.sqrt(20))
         said = held.run(np.tile(contact["base"], (len(rows), 1)), rows[:, :2])
@@ -91,7 +94,7 @@ def chained() -> dict[str, np.ndarray]:
 
 
 def test_regions_hold_at_any_angle_between_drive_and_surface():
-    found = chained()
+    found = chained(head_on=False)
     known = ~found["refused"]
     assert found["refused"].mean() < 0.15
     assert np.median(found["off_mm"][known]) < 1.0
@@ -102,11 +105,24 @@ def test_regions_hold_at_any_angle_between_drive_and_surface():
     assert found["turn_held"][found["taken"]].mean() > 0.85
 
 
+def test_a_whisker_that_may_bend_as_a_column_is_not_sure():
+    found = chained(head_on=True)
+    assert found["refused"].mean() > 0.85
+    assert found["taken"].mean() < 0.05
+
+
 def test_what_is_uncertain_is_not_sure():
     bases, tilts, _ = swept(0.12)
     said = ContactFilter().run(bases, tilts)
     assert said.sure[-1]
-    for doubt in ({"point_cov": said.point_cov + 1e-4 * np.eye(2)}, {"other": said.other + 0.5}):
+    column = {
+        "along": said.along + 0.8,
+        "normal_rad": said.normal_rad * 0.0 - 2.3,
+        "normal_sd": said.normal_sd * 0.0 + 0.1,
+    }
+    assert said._replace(**(column | {"along": said.along})).sure[-1]
+    assert said._replace(**(column | {"normal_rad": said.normal_rad})).sure[-1]
+    for doubt in ({"point_cov": said.point_cov + 1e-4 * np.eye(2)}, {"other": said.other + 0.5}, column):
         assert not said._replace(**doubt).sure.any()
     known = dict.fromkeys(("tip", "sweep", "normal_sd"), np.zeros(len(said.sample))) | {
         "tip": np.ones(len(said.sample))
