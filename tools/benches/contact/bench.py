@@ -54,6 +54,11 @@ def summary(kind: str, found: list[dict]) -> dict:
     reported = {
         "contacts": len(found),
         "refused": float(refused / (refused + kept)),
+        "cost_us": float(np.mean([one["cost_us"] for one in found])),
+    }
+    if not kept:
+        return reported
+    reported |= {
         "point_rms_mm": rms(late("off")),
         "point_median_mm": median(late("off")),
         "point_worst_mm": float(late("off").max()),
@@ -62,7 +67,6 @@ def summary(kind: str, found: list[dict]) -> dict:
         "point_held_90": float(late("inside").mean()),
         "motion_right": float((late("motion") == true_motion(kind)).mean()),
         "corner": float(late("corner").mean()),
-        "cost_us": float(np.mean([one["cost_us"] for one in found])),
     }
     if np.isfinite(late("turn")).all():
         reported |= normal_figures(late("turn"), late("turn_inside"), late("published_inside"), late("taken"))

@@ -4,6 +4,10 @@ from ..store import read_result
 from ..tables import lined, named
 
 MEASURED = (
+    "point_median_mm",
+    "point_rms_mm",
+    "point_worst_mm",
+    "point_held_90",
     "normal_median_deg",
     "normal_rms_deg",
     "normal_held_90",
