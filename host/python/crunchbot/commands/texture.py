@@ -25,7 +25,7 @@ from ..tables import TableError
 from ..touch.texture import model as texture
 from ..touch.texture import train as texture_train
 from ..touch.texture.change import notice, windows_of
-from ..touch.texture.drive import INSIDE_M, Drive, Stretch, over_tiles, stated, write
+from ..touch.texture.drive import INSIDE_M, Drive, Stretch, over_tiles, place_of, stated, write
 from ..touch.texture.lacking import lacking
 from ..touch.texture.spectral import HAZARD, HAZARD_LEAST, SpectralModel
 
@@ -108,7 +108,8 @@ def train(arguments: argparse.Namespace) -> int:
                 total=1, desc="train", bar_format="{desc} {bar} {percentage:3.0f} %", disable=None
             ) as bar:
                 progress = lambda done, of: advance(bar, done, of)  # noqa: E731
-                model = texture_train.train(recordings, rate_hz, window_ms, progress, hazard)
+                places = {name: list(map(place_of, some)) for name, some in files.items()}
+                model = texture_train.train(recordings, rate_hz, window_ms, progress, hazard, places)
             every = [speed for some in files.values() for speed in texture.speeds(some)]
             model.speed_m_s = (min(every), max(every)) if every else None
             model.columns = texture.channel_names(next(iter(files.values()))[0])

@@ -494,6 +494,36 @@ def test_what_training_prints_are_the_decisions_that_classify_makes_of_recording
     )
 
 
+def hum(hz, seed, n=600):
+    rng, t_s = np.random.default_rng(seed), np.arange(n) / RATE_HZ
+    tone = 200.0 * np.sin(2.0 * np.pi * (hz * t_s + rng.uniform()))
+    return np.round(32768 + tone[:, None] + rng.normal(0.0, 30.0, (n, 2)))
+
+
+def test_what_training_prints_of_a_drive_is_held_out_by_place(capsys, tmp_path):
+    """Tiles hum, each at a pitch of its own: who has seen one pass over a tile knows the others, and nobody knows a new tile."""
+    pitches_hz = {"A": (60.0, 240.0, 560.0), "B": (120.0, 360.0, 800.0)}
+    right = {}
+    for known, named in ((True, "c0r{}"), (False, "t{}")):
+        folder, out = tmp_path / f"{known}", tmp_path / f"{known}.json"
+        for surface, tiles in pitches_hz.items():
+            for n, hz in enumerate(tiles * 4):
+                write(folder / surface / f"drive_floor_left_{named.format(int(hz))}_{n}.csv", hum(hz, n))
+        assert run(capsys, "texture", "train", folder, "--window-ms", "25", "--out", out)[0] == 0
+        right[known] = json.loads(out.read_text())["figures"]["held_out_accuracy"]
+    assert right[False] > 0.95 and right[True] < 0.7
+
+
+def test_folds_keep_a_place_of_each_surface_and_each_recording_where_no_place_is_known():
+    made = {name: [hiss(s, False, g, 600) for s in range(6)] for name, g in (("A", 0.6), ("B", 1.4))}
+    places = {"A": ["c0r0", "c1r0", "c0r0", "c2r0", "c1r0", ""], "B": ["c5r5"] * 6}
+    folds = Learnt(made, RATE_HZ, 25.0, HAZARD, lambda done, of: None, places).folds
+    assert folds[0] == folds[2] and folds[1] == folds[4] and len(set(folds[:6])) == 4 and len(set(folds[6:])) == 6
+    alone = made | {"B": made["B"][:1]}, places | {"B": ["c5r5"]}
+    folds = Learnt(alone[0], RATE_HZ, 25.0, HAZARD, lambda done, of: None, alone[1]).folds
+    assert folds[0] == folds[2] and folds[1] == folds[4] and len(set(folds)) == 4 + 5
+
+
 def test_a_model_without_a_fold_has_seen_nothing_of_it():
     """Whatever the recordings of a fold are, its twin's rule, temperature, doubt and limits stay the same."""
     made = recordings(("VINYL", "ROUGH"), count=3, n=1000)

@@ -1,5 +1,6 @@
 """Recordings for training out of a drive: what each floor whisker felt while its tip was on one known surface."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ INSIDE_M = 0.05  # a border holds a tip, which lies behind its place then; the d
 MOVING_M_S = 0.02  # a tip that is slower shows 2 mm of floor in a window of 100 ms
 DEVIATIONS = 2.0  # of its place, that a tip is inside its tile beside this
 GAP_S = 0.25  # longer without a pose, and nobody knows the way between
+PLACE = re.compile(r".*_(?P<place>c\d+r\d+)_\d+\.csv")  # in a recording's name
 GAP_PERIODS = 1.5  # a longer step between two samples is a gap
 
 
@@ -94,6 +96,12 @@ def write(folder: Path, name: str, stretches: list[Stretch], columns: tuple[str,
         lines = [",".join([f"{t:.4f}", *row, *speed]) for t, row in zip(s.t_s, cells, strict=True)]
         file = "_".join(filter(None, [name, s.whisker, s.place, str(n)]))
         put(folder / s.surface / f"{file}.csv", "\n".join([head, *lines]) + "\n")
+
+
+def place_of(path: Path) -> str:
+    """The tile that a recording's name tells, as `write` puts it; else empty."""
+    found = PLACE.fullmatch(path.name)
+    return found["place"] if found else ""
 
 
 def _period(t_s: np.ndarray) -> float:

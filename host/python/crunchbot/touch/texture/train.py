@@ -37,13 +37,14 @@ def train(
     window_ms: float = 100.0,
     progress: Callable[[int, int], object] = lambda done, of: None,
     hazard: float = HAZARD,
+    places: dict[str, list[str]] | None = None,
 ) -> SpectralModel:
     """Learn from raw counts (n, channels) by class. `progress(done, of)` is called after each step; `hazard`: changes of
-    surface in window_ms.
+    surface in window_ms; `places`: where each recording is of, empty if not known: those of one place are held out together.
 
     ValueError when there is too little to learn from.
     """
-    learnt = Learnt(recordings, rate_hz, window_ms, hazard, progress)
+    learnt = Learnt(recordings, rate_hz, window_ms, hazard, progress, places)
     model = learnt.model()
     model.figures = learnt.figures()
     progress(1, 1)
@@ -53,11 +54,19 @@ def train(
 class Learnt:
     """What is learnt from recordings, and the models that have not seen some of them."""
 
-    def __init__(self, recordings: dict, rate_hz: float, window_ms: float, hazard: float, progress: Callable):
+    def __init__(
+        self,
+        recordings: dict,
+        rate_hz: float,
+        window_ms: float,
+        hazard: float,
+        progress: Callable,
+        places: dict[str, list[str]] | None = None,
+    ):
         self.classes, self.rate_hz, self.window_ms, self.hazard = list(recordings), rate_hz, window_ms, hazard
         parts = [_clean(np.asarray(r, dtype=np.float64)) for group in recordings.values() for r in group]
         self.parts, self.labels = _cut(parts, [k for k, group in enumerate(recordings.values()) for _ in group])
-        self.folds = np.arange(len(self.parts)) % min(FOLDS, len(self.parts))
+        self.folds = _folds(_places(recordings, places or {}), self.labels)
         asked, shortest = max(LENGTH_LEAST, round(rate_hz * window_ms / 1000.0)), min(map(len, self.parts))
         if shortest < LENGTH_LEAST:
             raise ValueError(f"the shortest recording has {shortest} samples; record each surface for some seconds")
@@ -212,6 +221,20 @@ def _cut(parts: list, labels: list) -> tuple[list, np.ndarray]:
         out += mine
         classes += [k] * len(mine)
     return out, np.array(classes)
+
+
+def _places(recordings: dict[str, list], places: dict[str, list[str]]) -> list[str]:
+    """Where each recording is of, in the order of `_cut`; empty if not known."""
+    known = [(places.get(name, [""] * len(group)), len(group)) for name, group in recordings.items()]
+    return [p for where, count in known for p in (where * PIECES if count == 1 else where)]
+
+
+def _folds(places: list[str], labels: np.ndarray) -> np.ndarray:
+    """Of each recording, class by class: those of one place are in one fold, unless a surface has no other place."""
+    of = {k: {p for p, label in zip(places, labels, strict=True) if label == k} for k in set(labels)}
+    which = [(k, p if p and len(of[k]) > 1 else n) for n, (p, k) in enumerate(zip(places, labels, strict=True))]
+    order = list(dict.fromkeys(which))
+    return np.array([order.index(one) % min(FOLDS, len(order)) for one in which])
 
 
 def _floor(parts: list) -> np.ndarray:
