@@ -45,6 +45,7 @@ HEADERS = {
             "filter/filter.h",
             "belief/belief.h",
             "filter/replay.h",
+            "filter/fit.h",
             "mapping/mapper.h",
             "planning/coverage.h",
         )

@@ -7,6 +7,7 @@ import sys
 from ..arguments import add_output, whole_number
 from ..nav import localise
 from ..nav.faults import ground_faults, row_faults
+from ..nav.fit import fit_faults
 from ..nav.localise import SettingError
 from ..scene import PRIOR, SceneError, load
 from ..tables import TableError
@@ -58,7 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"whisker: warning: {path}: {fault}", file=sys.stderr)
     settings, regions = _settings(arguments.set), localise.REGION_ROWS
     result = localise.run(arguments.filter, scene, observations, settings, arguments.seed, regions)
-    for warning in (*ground_faults(result.poses, scene), *localise.warnings(result)):
+    fits = fit_faults(scene, observations, result.table)
+    for warning in (*ground_faults(result.poses, scene), *fits, *localise.warnings(result)):
         print(f"whisker: warning: {warning}", file=sys.stderr)
     if arguments.out:
         localise.write_estimates(arguments.out, result, observations)

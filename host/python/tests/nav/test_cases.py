@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commandkit import run
-from PIL import Image
+from PIL import Image, ImageFilter
 
 from crunchbot.nav.faults import row_faults
 from crunchbot.nav.filters import Filter
+from crunchbot.nav.fit import fit_faults
 from crunchbot.nav.observations import joined, observations_path, observed, read_observations
 from crunchbot.observation import Row
 from crunchbot.occupancy import read_map
@@ -151,6 +152,10 @@ OF_SCENES = {
     "centimetres": (factor("odo_[xy]_m", 100.0), r"'odo_x_m': .* more than the base can.*\(are these cm or mm"),
     "millimetres": (factor("odo_[xy]_m", 1000.0), r"'odo_x_m': .* more than the base can.*\(are these mm"),
     "degrees": (factor("odo_theta_rad", 57.29578), r"'odo_theta_rad': .* \(are these degrees"),
+    "feet": (factor("odo_x_m", 1 / 0.3048), "contacts fit the map [0-9]* .*: the values of 'odo_x_m' look like feet: 1 = 0.3048 m; convert"),
+    "turns": (factor("odo_theta_rad", 1 / math.tau), ": the values of 'odo_theta_rad' look like turns: 1 = 6.28319 rad; convert"),
+    "turns_to_the_right": (factor("odo_theta_rad", -1.0), ": the values of 'odo_theta_rad' count turns to the right; convert"),
+    "backwards": (factor("odo_x_m", -1.0), ": the values of 'odo_x_m' count backwards; convert"),
     "odo_of_words": (cells(lambda n, row: row.update(odo_theta_rad="left")), "'odo_theta_rad': 100% of the rows are no number"),
     "odo_of_zeros": (factor("odo_.*", 0.0), "'object1_mm' changes, and the odometry is 0 in every row"),
     "odo_x_and_y_exchanged": (cells(lambda n, row: row.update(odo_x_m=row["odo_y_m"], odo_y_m=row["odo_x_m"])), r"'odo_y_m' sums to .* sideways, .*\(are x and y exchanged"),
@@ -219,7 +224,7 @@ OF_SCENES = {
     # prior
     "prior_crlf_bom": (whole("prior.toml", lambda data: BOM + data.replace(b"\n", b"\r\n")), RIGHT),
     "prior_deg": (prior("[1.904608, 0.257048, 248.05]"), "! prior.toml, line 2: 'mean' .*heading in rad from -10 to 10, not 248.05"),
-    "prior_int": (prior("[2, 0, -2]", "[1, 1, 1]"), OTHER_WORLD),
+    "prior_int": (prior("[2, 0, -2]", "[1, 1, 1]"), "contacts fit the map .*: look at"),  # too wide for this filter
     "prior_wide": (prior(sigma="[100.0, 100.0, 100.0]"), OTHER_WORLD),
     "prior_nan": (prior("[nan, 0.2, 0.0]"), "! prior.toml, line 2: 'mean' must be numbers .*not nan"),
     "prior_neg": (prior(sigma="[-0.02, 0.02, 0.03]"), "! prior.toml, line 3: 'sigma' must be numbers"),
@@ -333,6 +338,12 @@ def grey(wall, floor):
     return np.where(WALL, wall, floor).astype(np.uint8)
 
 
+def thick():
+    """Walls and boxes a pixel wider each way, as a blurred image has them."""
+    near = Image.fromarray(ROOM).filter(ImageFilter.MinFilter(3))
+    return np.asarray(near)
+
+
 def ink():
     bands = np.zeros((*WALL.shape, 4), np.uint8)
     bands[WALL, 3] = 255
@@ -434,6 +445,10 @@ OF_MAPS = {
     "shift": (shifted, RIGHT),
     "yaw1": (turned, RIGHT),
     "shift_prior_of_image": (yaml(ORIGIN, "origin: [-10.0, -3.0, 0.0]"), r"! prior.toml: 'mean' \(1.2, 1\) is outside the arena, which is within \(-10, -3\) and \(-7, -1\); give"),
+    "left_for_right": (image(ROOM[:, ::-1]), ": the map looks mirrored; mend it"),
+    "upside_down": (image(ROOM[::-1]), ": the map looks mirrored and turned by 180 degrees; mend it"),
+    "turned_image": (image(np.rot90(ROOM)), ": the map looks turned by 270 degrees; mend it"),
+    "blurred": (image(thick()), "contacts fit the map [0-9]* .*: look at the map"),
     "prior_in_wall": (both(yaml(ORIGIN, "origin: [-10.0, -3.0, 0.0]"), text("prior.toml", "[1.2, 1.0, 0.3]", "[-9.99, -2.0, 0.3]")), r"mean \(-9.99, -2\) is in an obstacle; the belief is clipped"),
 }  # fmt: skip
 
@@ -462,6 +477,18 @@ def test_a_map_beside_its_arena_is_refused_in_its_numbers(capsys, tmp_path):
         0.0,
         *answered(capsys, CASES / "plain", "--map", folder / "ok.yaml"),
     )
+
+
+@pytest.mark.parametrize("name", ["feet", "turns"])
+def test_a_cause_is_named_where_the_filter_finds_places_that_fit(name):
+    """The filter that looks for its place anew is sure now and then, and what it reads there fits."""
+    scene = load(CASES / "plain")
+    rows = read_observations(observations_path(CASES / "plain"), scene)
+    by = {"feet": (1 / 0.3048, 1.0, 1.0), "turns": (1.0, 1.0, 1 / math.tau)}[name]
+    for changed in (rows, replace(rows, odometry=rows.odometry * by)):
+        table, _ = Filter("adaptive", scene).replay(changed, 0, len(changed))
+        found = fit_faults(scene, changed, table)
+        assert found == [] if changed is rows else f"look like {name}: 1 = " in found[0], found
 
 
 def test_rows_that_come_late_are_not_missing():
