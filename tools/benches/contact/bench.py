@@ -56,6 +56,10 @@ def summary(kind: str, found: list[dict]) -> dict:
         "refused": float(refused / (refused + kept)),
         "cost_us": float(np.mean([one["cost_us"] for one in found])),
     }
+    if true_motion(kind) == "sweep":
+        last = np.array([one["speed"][-1] for one in found if len(one["speed"])])
+        reported |= {"speed_median": median(last), "speed_within_10": float((np.abs(last) < 0.1).mean())}
+        reported["speed_held_90"] = float(np.mean([one["speed_inside"][-1] for one in found]))
     if not kept:
         return reported
     reported |= {
@@ -71,10 +75,6 @@ def summary(kind: str, found: list[dict]) -> dict:
     if np.isfinite(late("turn")).all():
         reported |= normal_figures(late("turn"), late("turn_inside"), late("published_inside"), late("taken"))
         reported |= {"taken": float(late("taken").sum() / (refused + kept)), "contour_rms_mm": rms(late("contour"))}
-    if true_motion(kind) == "sweep":
-        last = np.array([one["speed"][-1] for one in found if len(one["speed"])])
-        reported |= {"speed_median": median(last), "speed_within_10": float((np.abs(last) < 0.1).mean())}
-        reported["speed_held_90"] = float(np.mean([one["speed_inside"][-1] for one in found]))
     known = np.isfinite(late("slides"))
     if known.any():
         reported |= slip_figures(late("slip")[known], late("slides")[known])
