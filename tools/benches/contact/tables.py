@@ -8,6 +8,8 @@ MEASURED = (
     "point_rms_mm",
     "point_worst_mm",
     "point_held_90",
+    "bound_rms_mm",
+    "motion_right",
     "normal_median_deg",
     "normal_rms_deg",
     "normal_held_90",
