@@ -138,8 +138,11 @@ def bin_(house, tmp_path) -> Path:
     return tmp_path / "venv/bin"
 
 
-def ros2_scene(folder: Path) -> Path:
-    """A scene with a base of ROS 2: `base` says what it takes without its extra, and needs it to drive."""
+# What needs an extra, where the command's help does without it: {1} is a scene with a base of ROS 2, {2} a file to be.
+USES = {"cyclonedds": "base {1} --trial", "scenes": "map {1} --out {2}"}
+
+
+def scene_of_ros2(folder: Path) -> Path:
     with zipfile.ZipFile(ROOT / "host/python/crunchbot/data/examples.zip") as examples:
         examples.extractall(folder)
     table = "[base]\nwheel_base_m = 0.16\nwheel_most_m_s = 0.22\nwheel_step_m_s = 0.01\nacceleration_m_s2 = 1.5\n"
@@ -154,8 +157,8 @@ def test_a_remedy_installs_what_its_command_needs(bin_, house, remedy, tmp_path)
     extra = remedy.partition("[")[2].rstrip("]")
     needing = [command for command, one in EXTRAS.items() if one == extra and command not in LAB_COMMANDS]
     if needing:
-        words = ["--trial", ros2_scene(tmp_path)] if needing[0] == "base" else ["--help"]
-        said = run(bin_ / "whisker", needing[0], *words).stderr
+        words = USES.get(extra, "{0} --help").format(needing[0], scene_of_ros2(tmp_path), tmp_path / "out").split()
+        said = run(bin_ / "whisker", *words).stderr
         assert f"pip install 'crunchbot[{extra}]'" in said, "it was needed"
     own = ["--find-links", DIST] if remedy.startswith("crunchbot-") or extra == "lab" else []
     pip(bin_ / "python", "install", "-q", "--no-index", *own, "--find-links", house, remedy)
