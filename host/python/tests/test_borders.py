@@ -20,6 +20,7 @@ import crunchbot
 from crunchbot.bridge.ring import FRAME, Writer
 from crunchbot.native import as_doubles, doubles, ffi, lib, octets
 from crunchbot.nav.filters import COMPONENT, Filter, Sensor, pack, prior_fault
+from crunchbot.nav.fit import fitted
 from crunchbot.nav.mapper import OneMap
 from crunchbot.planning.coverage import CoveragePlanner, Field, Vehicle
 from crunchbot.touch.contact import Contact
@@ -79,6 +80,7 @@ def published(frames) -> None:
 
 
 SCENE, OBSERVATIONS = level0.record(3, rows=ROWS)
+ANSWERS, _ = Filter("odometry", SCENE).replay(OBSERVATIONS, 0, ROWS)
 ROW = {name: getattr(OBSERVATIONS, name)[1] for name in ("odometry", "texture", "radial_m")}
 NOISE = np.random.default_rng(1).normal(0.0, 5.0, (10 * LENGTH, CHANNELS))
 COMPONENTS = np.zeros(2, COMPONENT)
@@ -97,6 +99,7 @@ CASES = {
         {"odometry": (0,), "texture": (0, 1), "radial_m": (0,)},
     ),
     "nav.filters.Filter.replay": of_rows(lambda rows: Filter("odometry", SCENE).replay(rows, 0, len(rows))),
+    "nav.fit.fitted": of_one(lambda table: fitted(SCENE, OBSERVATIONS, table), "table", ANSWERS, 0),
     "nav.filters.pack": of_rows(
         lambda rows: pack(rows, OBSERVATIONS.texture.shape[1:], OBSERVATIONS.radial_m.shape[1], 0)
     ),
