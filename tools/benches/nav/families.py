@@ -14,7 +14,6 @@ import argparse
 import hashlib
 import json
 import math
-import os
 import subprocess
 import tempfile
 from collections.abc import Sequence
@@ -28,9 +27,8 @@ from .. import store
 from ..tables import NONE, lined, table
 from .judge import FIGURES, REGIONS, differences, figures, judged
 from .states import State, stated
-from .worlds import Family, all_families
+from .worlds import RECORDINGS, Family, all_families, recordings_option
 
-RECORDINGS = "WHISKER_RECORDINGS"  # in the environment: the folder of --data
 CHANCE_DRAWS = 10  # of fewer the spread says little
 # What draws and figures follow from, beside the states.
 MADE_BY = ("tools/benches/nav/worlds.py", "tools/benches/nav/judge.py", "lab/crunchbot_lab/scenes")
@@ -161,8 +159,6 @@ def run(
     parent: str | None = None,
 ) -> None:
     states = [stated(words) for words in state or [str(store.ROOT)]]
-    if data is None and RECORDINGS in os.environ:
-        data = Path(os.environ[RECORDINGS])
     if data is None:
         store.leave_out("real runs", f"give --data DIR or {RECORDINGS}, the folder of the logs")
     every = all_families(data)
@@ -183,6 +179,6 @@ def run(
 def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--runs", type=int, default=200, help="of all families together (default: %(default)s)")
     parser.add_argument("--state", action="append", default=[], metavar="TREE[:FILTER[:KEY=VALUE,...]]")
-    parser.add_argument("--data", type=Path, metavar="DIR", help=f"recordings of others; default: ${RECORDINGS}")
+    recordings_option(parser)
     parser.add_argument("--only", action="append", default=[], help="families or groups; may be repeated")
     parser.add_argument("--parent", metavar="COMMIT", help="whose draws; default: the parent of what is measured")

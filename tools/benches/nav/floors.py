@@ -3,7 +3,6 @@
 .venv/bin/python tools/benches floors --data DIR       with DIR/thymio/random_1 and random_2
 """
 
-import argparse
 import tempfile
 from pathlib import Path
 
@@ -18,8 +17,8 @@ from crunchbot_lab.scenes.recordings import read_recording
 
 from .. import store
 from .peer_runs import guests, mrpt_entries, python_entries
+from .worlds import REAL, RECORDINGS, recordings_option
 
-LOGS = ("random_1", "random_2")
 SETTINGS = ("500", "2000", "300-20000 KLD")  # of the peers
 NEAR_M = 0.06
 
@@ -45,9 +44,8 @@ def measure(folder: Path, build: Path) -> dict[str, dict]:
 
 def run(build: Path, data: Path | None = None) -> None:
     if data is None:
-        return store.leave_out("floors", "give --data DIR, the folder of the logs")
-    store.write_result("floors", {log: measure(data / "thymio" / log, build) for log in tqdm(LOGS, desc="floors")})
+        return store.leave_out("floors", f"give --data DIR or {RECORDINGS}, the folder of the logs")
+    store.write_result("floors", {log: measure(data / "thymio" / log, build) for log in tqdm(REAL, desc="floors")})
 
 
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--data", type=Path, metavar="DIR", help="folder of the logs, as DIR/thymio/random_1")
+options = recordings_option

@@ -4,7 +4,9 @@ What a family leaves open is drawn anew for each seed: sizes, whiskers, noise, w
 carried to. Recordings of others are not kept here: their families need the folder where they lie.
 """
 
+import argparse
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +26,7 @@ from crunchbot_lab.scenes.walk import Pace
 ROWS, SLOW_ROWS, QUICK_ROWS = 600, 300, 3000  # a minute at 10, 5 and 50 Hz
 KIDNAPS, KIDNAP_ROWS = (200, 500), 850
 CREATE = World(odometry=0.08, odometry_memory_m=0.5, run_gain=0.05, drift_rad=0.03)
+RECORDINGS = "WHISKER_RECORDINGS"  # in the environment: the folder of --data
 REAL = ("random_1", "random_2")  # folders of a Thymio's runs, below `thymio` of the folder of recordings
 REAL_FIRST = 100  # rows: a real run begins at one of these
 SPLICED, SPLICED_ROWS = 4, (200, 300)  # parts of a spliced run, rows of each
@@ -324,6 +327,16 @@ def spliced(folder: Path) -> Callable[[int], Made]:
 
 def _stamped(rows: Observations) -> Observations:
     return rounded(replace(rows, t_s=(np.arange(len(rows)) + 1) * ROW_S))
+
+
+def recordings_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--data",
+        type=Path,
+        default=os.environ.get(RECORDINGS),
+        metavar="DIR",
+        help=f"recordings of others, as DIR/thymio/random_1 (default: ${RECORDINGS})",
+    )
 
 
 def all_families(recordings: Path | None) -> dict[str, Family]:

@@ -11,17 +11,16 @@ is taken for a third one. Draws, journal and --data: as of nav_families.
 
 import argparse
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from .. import store
-from .families import RECORDINGS, against, measure, parent_commit
+from .families import against, measure, parent_commit
 from .judge import COMPARED
 from .states import stated
-from .worlds import Family, all_families
+from .worlds import Family, all_families, recordings_option
 
 MOST = 7  # settings: eight states a draw
 SWITCHES = ("trust.learn=0", "texture.repeat=0", "motion.gaps=0")
@@ -72,8 +71,6 @@ def run(_build: Path, switch: Sequence[str], state: str, runs: int, data: Path |
     switch = switch or SWITCHES
     if len(switch) > MOST:
         raise SystemExit(f"--switch: {len(switch)} settings; give {MOST} at most")
-    if data is None and RECORDINGS in os.environ:
-        data = Path(os.environ[RECORDINGS])
     families, commit, found = all_families(data), parent or parent_commit(), []
     for half, signs in enumerate((hadamard(len(switch)), -hadamard(len(switch)))):
         words = [",".join(key for key, sign in zip(switch, row, strict=True) if sign > 0) for row in signs]
@@ -94,5 +91,5 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--state", default=f"{store.ROOT}:adaptive", metavar="TREE:FILTER", help="(default: this tree's)"
     )
     parser.add_argument("--runs", type=int, default=430, help="draws of all families together (default: %(default)s)")
-    parser.add_argument("--data", type=Path, metavar="DIR", help=f"recordings of others; default: ${RECORDINGS}")
+    recordings_option(parser)
     parser.add_argument("--parent", metavar="COMMIT", help="whose draws; default: the parent of what is measured")
