@@ -17,7 +17,7 @@ PAGES = [
 TRACKED = subprocess.run(["git", "-C", ROOT, "ls-files"], capture_output=True, text=True, check=True).stdout.split()
 FOLDERS = {path.partition("/")[0] for path in TRACKED if "/" in path}
 SOURCE = re.compile(r"[\w./*\[\]-]+\.(?:c|h|cpp|py|v|vh|js|mjs|rs|sh|md|pml|ld)")
-MADE = {"drive.py", "OUT.v"}  # files that a page has the user make
+MADE = {"OUT.v"}  # files that a page has the user make
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 TOUR = ROOT / "docs/code_tour.md"
 

@@ -78,10 +78,27 @@ FIGURES = (
         "demo",
         lambda d: (cm(d["adaptive_error_median_m"]),),
     ),
-    Figure("docs/record.md", r"`crunchbot.recording` \| (\d+) % \| (\d+) \|", "damage", damaged("whisker")),
-    Figure("docs/record.md", r"front to back \| (\d+) % \| (\d+) \|", "damage", damaged("mcap, stream")),
-    Figure("docs/record.md", r"by the index \| (\d+) % \| (\d+) \|", "damage", damaged("mcap, indexed")),
-    Figure("docs/record.md", r"rosbags [\d.]+ \| (\d+) % \| (\d+) \|", "damage", damaged("rosbags")),
+    Figure(
+        "docs/record.md",
+        r"`crunchbot.recording`\s+reads\s+(\d+)\s+%.*?word\s+in\s+(\d+)\s+",
+        "damage",
+        damaged("whisker"),
+    ),
+    Figure(
+        "docs/record.md",
+        r"reads\s+(\d+)\s+%\s+from\s+front.*?loses\s+so\s+in\s+(\d+);",
+        "damage",
+        damaged("mcap, stream"),
+    ),
+    Figure(
+        "docs/record.md",
+        r"by\s+the\s+index\s+it\s+reads\s+(\d+)\s+%.*?loses\s+in\s+(\d+)\.",
+        "damage",
+        damaged("mcap, indexed"),
+    ),
+    Figure(
+        "docs/record.md", r"rosbags\s+[\d.]+\s+reads\s+(\d+)\s+%.*?loses\s+in\s+(\d+)\.", "damage", damaged("rosbags")
+    ),
     Figure("docs/record.md", r"Of (\d+) damaged files", "damage", lambda d: (str(d["files"]),)),
     Figure(
         "docs/results/drills.md",

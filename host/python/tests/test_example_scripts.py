@@ -1,8 +1,11 @@
 """The examples as a user runs them, on the data set that `whisker examples` unpacks."""
 
 import importlib.util
+import socket
 import subprocess
 import sys
+import threading
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -48,6 +51,45 @@ def test_every_filter_is_measured_and_drawn(data, tmp_path, capsys):
     drawn = chart.read_text()
     assert "<svg" in drawn and drawn.count("<use") > len(found)
     assert len(capsys.readouterr().out.splitlines()) == len(found) + 1
+
+
+class Clock:
+    """Time that passes by sleeping alone."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.now = round(self.now + seconds, 6)
+
+
+def test_moves_are_ordered_again_before_the_base_stops_them(tmp_path, monkeypatch, capsys):
+    heard, clock = [], Clock()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as door:
+        door.bind(str(tmp_path / "base.sock"))
+        door.listen()
+
+        def serve():
+            with door.accept()[0] as client:
+                while message := client.recv(256):
+                    heard.append((clock.now, message.decode()))
+                    client.send(b"odometry 1 0 0 0 0 0 0 0 0 0" if message == b"odometry" else b"sent 1 0 0")
+
+        served = threading.Thread(target=serve)
+        served.start()
+        script = example("drive")
+        monkeypatch.setattr(script, "time", clock)
+        script.main(str(tmp_path / "base.sock"), 2, [(0.1, 0.0, 1.0), (0.0, -0.5, 0.5)])
+        served.join()
+    runs = " ".join(message for _, message in heard).split("odometry")
+    assert len(runs) == 3 and not runs[2] and runs[0].split() == runs[1].split()
+    assert runs[0].count("drive 0.1 0.0") == 20 and runs[0].count("drive 0.0 -0.5") == 10
+    orders = [when for when, message in heard if message != "odometry"]
+    assert max(b - a for a, b in pairwise(orders)) < 0.3 and orders[-1] == pytest.approx(2.95)
+    assert capsys.readouterr().out.count("Motion(x_m=1.0") == 2
 
 
 def test_each_example_says_how_it_is_run():

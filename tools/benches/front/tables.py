@@ -1,11 +1,11 @@
-"""Tables of docs/results.md: the figures of bench/headlines.toml, each with its origin; every chart's command."""
+"""Tables of docs/results.md: the figures of bench/headlines.toml, each with its origin; finished studies."""
 
 import json
 import tomllib
 
 from crunchbot_lab.report.share import wilson
 
-from ..store import CHARTS, COMMAND_OF_CHART, COMMAND_OF_RESULT, ORIGINS, RESULTS, ROOT, read_result
+from ..store import COMMAND_OF_RESULT, ORIGINS, RESULTS, ROOT, read_result
 from ..tables import cell, table
 
 HEADLINES = tomllib.loads((ROOT / "bench/headlines.toml").read_text())["figure"]
@@ -60,12 +60,3 @@ def archive() -> str:
     """Of docs/results/archive.md."""
     studies = tomllib.loads((ROOT / "bench/archive.toml").read_text())["study"]
     return table(list(studies[0]), [list(study.values()) for study in studies])
-
-
-def charts() -> str:
-    rows = [
-        [f"[{name}](charts/{name}.svg)", f"`.venv/bin/python {command}`"]
-        for name, command in sorted(COMMAND_OF_CHART.items())
-        if (CHARTS / f"{name}.svg").exists()
-    ]
-    return table(["chart", "command"], rows)
