@@ -124,10 +124,10 @@ def test_place_and_route_is_repeated_for_other_gateware_only(monkeypatch, tmp_pa
     stored = {"gateware": "0123456789ab", "boards": {"ulx3s": {"runs": [run, {"lanes": 28}]}}}
     monkeypatch.setattr(bench, "CACHE", tmp_path)
     monkeypatch.setattr(bench.store, "read_result", lambda name: stored)
-    monkeypatch.setattr(bench.store, "state", lambda *parts: "0123456789ab")
+    monkeypatch.setattr(bench, "GATEWARE", "0123456789ab")
     assert bench.default_build("ulx3s", 6, [0]) == run
     assert bench.default_build("ulx3s", 28, [0]) is None, "it was not placed"
-    monkeypatch.setattr(bench.store, "state", lambda *parts: "ba9876543210")
+    monkeypatch.setattr(bench, "GATEWARE", "ba9876543210")
     assert bench.default_build("ulx3s", 6, [0]) is None
 
 

