@@ -25,7 +25,8 @@ sim_create *make_create(const CreateOptions &options, uint64_t seed)
 
 } // namespace
 
-CreateBase::CreateBase(const CreateOptions &options, uint64_t seed) : create_(make_create(options, seed))
+CreateBase::CreateBase(const CreateOptions &options, uint64_t seed, bool whole)
+    : create_(make_create(options, seed)), whole_(whole)
 {
     char error[CHUNK_BYTES] = "";
     if (create_pty_open(&pty_, options.link.c_str(), error, sizeof error) != 0) {
@@ -83,9 +84,21 @@ void CreateBase::drive(sim_world *world, std::optional<uint64_t> written)
 void CreateBase::tick(const sim_world *world)
 {
     uint8_t bytes[CHUNK_BYTES];
+    const size_t before = leaving_.size();
     create_ground_tick(create_, world);
     while (const size_t count = sim_create_take(create_, bytes, sizeof bytes)) {
-        sent_ += create_pty_write(&pty_, bytes, count);
+        leaving_.insert(leaving_.end(), bytes, bytes + count);
+    }
+    if (!whole_ || leaving_.size() == before || leaving_.size() >= CHUNK_BYTES) {
+        send();
+    }
+}
+
+void CreateBase::send()
+{
+    if (!leaving_.empty()) {
+        sent_ += create_pty_write(&pty_, leaving_.data(), leaving_.size());
+        leaving_.clear();
     }
 }
 

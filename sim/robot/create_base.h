@@ -22,8 +22,10 @@ namespace bridge_sim
 class CreateBase
 {
   public:
-    // Opens the port. Throws std::runtime_error with one line if it cannot.
-    CreateBase(const CreateOptions &options, uint64_t seed);
+    // Opens the port. Throws std::runtime_error with one line if it cannot. `whole`: bytes that leave without a pause
+    // come to the port at once. A driver that goes by the wall's clock then finds no gap in a frame, however slow the
+    // simulation.
+    CreateBase(const CreateOptions &options, uint64_t seed, bool whole);
     ~CreateBase();
     CreateBase(const CreateBase &) = delete;
     CreateBase &operator=(const CreateBase &) = delete;
@@ -50,9 +52,13 @@ class CreateBase
     uint64_t sent() const;
 
   private:
+    void send();
+
     sim_create *create_;
+    bool whole_;
     create_pty pty_{};
     std::vector<uint8_t> waiting_; // come, but not handed to the robot
+    std::vector<uint8_t> leaving_; // left the robot, but not written to the port
     uint64_t handed_ = 0;
     uint64_t sent_ = 0;
     std::optional<std::chrono::steady_clock::time_point> waits_since_; // for bytes that the pilot counts

@@ -126,6 +126,12 @@ double now_s()
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+// Does the base's driver go by the wall's clock? With a pilot in step it goes by the base's frames.
+bool clocked(const Options &options)
+{
+    return options.pace > 0 && options.followers == 0;
+}
+
 } // namespace
 
 void Simulation::WorldDeleter::operator()(sim_world *world) const
@@ -138,7 +144,8 @@ Simulation::Simulation(const Options &options)
       signals_(block_signals()), rig_(rig_of(options, scene_)), scheduler_(*rig_),
       faults_(options.faults, options.usb_faults), runner_(*rig_, scheduler_, plan_of(options, scene_), faults_),
       truth_(options.truth, scene_), wheels_(options.wheels),
-      create_(options.create.on ? std::make_unique<CreateBase>(options.create, options.seed) : nullptr),
+      create_(options.create.on ? std::make_unique<CreateBase>(options.create, options.seed, clocked(options))
+                                : nullptr),
       followers_(options.socket, options.followers, options.create.on ? Answer::BASE : Answer::DRIVE),
       defect_(options.defect), pace_(options.pace), total_(options.ticks())
 {

@@ -186,6 +186,28 @@ def test_without_a_pilot_bytes_act_as_they_come(tmp_path):
     assert truth(tmp_path)[-1]["x_m"] - X_M == pytest.approx(0.2, abs=2e-6)
 
 
+def test_a_paced_base_sends_frames_whole(tmp_path):
+    heard = []
+
+    def listen():
+        while not (tmp_path / "create").is_symlink():
+            os.sched_yield()
+        port = os.open(tmp_path / "create", os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(port)
+        os.write(port, OPENING)
+        while len(heard) < 20:
+            heard.append(os.read(port, 512))
+        os.close(port)
+
+    listener = threading.Thread(target=listen)
+    listener.start()
+    simulation = simulate(tmp_path, 2, 1, [CLIENT, tmp_path / "stream.bin", 4096, 200], "--pace", 1)
+    _, error = simulation.communicate(timeout=TIMEOUT_S)
+    listener.join()
+    assert simulation.returncode == 0, error
+    assert all(heard) and all(frames(read) and len(read) % len(frames(read)[0]) == 0 for read in heard)
+
+
 def refused(folder: Path, *options) -> str:
     command = [SIMULATION, "--scene", folder / "x", "--seconds", "1", *map(str, options), "--", "true"]
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=TIMEOUT_S)

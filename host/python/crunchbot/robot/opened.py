@@ -4,8 +4,7 @@ run = crunchbot.open("examples/scene")      # or "robot.mcap", or "robot" while 
 for row in run: ...                         # a Row: cells by column
 run.localise("adaptive").poses              # (n, 3)
 run.to_pandas()                             # a row of the robot in each line
-run.show()                                  # in a notebook: the arena, the truth and an estimate
-run.to_rerun("run.rrd")                     # the same and each reading over time, for the viewer of rerun
+run.show(), run.to_rerun("run.rrd")         # in a notebook, in the viewer of rerun: arena, truth, estimate
 """
 
 import math
@@ -131,7 +130,8 @@ class LiveRows:
         self.close()
 
     def __iter__(self) -> Iterator[Row]:
-        """Until the robot's stream ends; rows that were missed come without readings, so that no motion is lost."""
+        """Until the robot's stream ends; rows that were missed come without readings, so that no motion is lost. Motion inf:
+        lifted, or not heard for 0.45 s, it may have been carried; a simulated base on a busy machine needs a lower --pace."""
         while True:
             received = self._inbox.take(timeout_s=LOOK_S)
             for step in self._follower.take(received):
