@@ -35,7 +35,7 @@ def measure(folder: Path, build: Path) -> dict[str, dict]:
     for name in localise.filter_names():
         done = localise.run(name, scene, rows, {})
         found[name] = judged(done.poses, done.step_us, rows)
-    for peer in (p for p in mrpt_entries(build, 1) + python_entries(1) + guests(1) if p.setting in SETTINGS):
+    for peer in (p for p in mrpt_entries(build, 1) + python_entries(build, 1) + guests(1) if p.setting in SETTINGS):
         with tempfile.TemporaryDirectory() as out:
             poses, us = peer.run(Path(out), scenes.Made(scene, rows), 0)
         found[f"{peer.filter} {peer.setting}"] = judged(poses, us, rows)
