@@ -62,9 +62,11 @@ def half_hours(data: dict) -> tuple[str, ...]:
 FIGURES = (
     Figure(
         "README.md",
-        r"grid\s+(\d+)\s+cm.*?adaptive\s+filter\s+(\d+)\s+cm.*?foveal\s+grid\s+(\d+)\s+cm.*?alone\s+(\d+)\s+cm",
+        r"filter\s+(\d+)\s+mm,\s+an\s+exact\s+grid\s+(\d+)\s+mm.*?foveal\s+grid\s+(\d+)\s+mm.*?alone\s+(\d+)\s+mm",
         "demo",
-        lambda d: tuple(cm(d[f"{name}_error_median_m"]) for name in ("pose", "adaptive", "foveal", "odometry")),
+        lambda d: tuple(
+            f"{1e3 * d[f'{name}_error_median_m']:.0f}" for name in ("adaptive", "pose", "foveal", "odometry")
+        ),
     ),
     Figure(
         "README.md",

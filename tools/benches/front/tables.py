@@ -15,6 +15,8 @@ TEXTURE_WINDOWS = 1920  # of the held-out drives of benches/texture/cost.py
 def fields(result: str) -> dict:
     """Of a result, for patterns; sums and choices that a pattern cannot make."""
     data = read_result(result)
+    if result == "demo":
+        return data | {"bound": 1e6 * wilson(data["frames_lost"], data["frames_sent"])[1]}
     if result == "nav_families":
         found = data["families"]["all"]
         low, high = wilson(found["locked"], found["draws"])
