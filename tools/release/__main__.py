@@ -31,6 +31,12 @@ ONCE = (
     "Debian packages",
     "site",
 )  # not made again by --twice: other machines' compilers and dates of Sphinx are in them
+BEGIN = (
+    "sha256sum --check --ignore-missing SHA256SUMS",
+    "python3 -m venv ~/whisker && . ~/whisker/bin/activate",
+    "pip install --find-links . 'crunchbot[view]' && whisker try",
+    "pip install --find-links . 'crunchbot[lab]' && whisker robot --simulated --desktop",
+)
 # Each file by its name's pattern: whose it is. A file that fits none fails the tool.
 ABOUT = {
     "crunchbot-[0-9]*x86_64.whl": "Python: library, filters and the command `whisker`; Intel and AMD",
@@ -118,8 +124,7 @@ def sums() -> str:
 def page(missing: dict[str, str]) -> str:
     """RELEASE.md: a line for each file, and what is missing and why."""
     lines = ["# CrunchBot: what to download", "", "Never yet run on silicon: see the README. Then, in this folder:", ""]
-    lines += ["    sha256sum --check --ignore-missing SHA256SUMS", "    pip install --find-links . 'crunchbot[lab]'"]
-    lines += ["    whisker try", "", "| file | MB | what |", "|---|---|---|"]
+    lines += [f"    {command}" for command in BEGIN] + ["", "| file | MB | what |", "|---|---|---|"]
     for path in sorted(DIST.iterdir()):
         if path.name not in (SUMS, PAGE):
             about = next(text for pattern, text in ABOUT.items() if path.match(pattern))

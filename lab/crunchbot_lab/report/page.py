@@ -165,7 +165,7 @@ def _spread(run: Run) -> list[str]:
     seeds = run.seeds["seed"]
     text = (
         f"One run says little. Seeds {seeds.min():.0f} to {seeds.max():.0f} (other floors, obstacles and starts) were replayed with "
-        "the same whiskers and models by the command above, at the level of signals: without bits, faults, serial line and network."
+        "the same whiskers and models, at the level of signals: without bits, faults, serial line and network."
     )
     rows = []
     for name in FILTERS:

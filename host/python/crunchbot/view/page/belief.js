@@ -146,11 +146,11 @@ class Belief {
     }
   }
 
-  /* The share of each place beside it, when there is more than one. */
+  /* The share of each place above it, when there is more than one. */
   drawShares(plan, pen) {
-    if (this.modes.length < 2) return;
-    for (const mode of this.modes.slice(0, 6)) {
-      const [x, y, wide] = [plan.x(mode.x), Math.max(12 * plan.ratio, plan.y(mode.y) - 0.24 * plan.scale), 38 * plan.ratio];
+    for (const mode of this.modes.length < 2 ? [] : this.modes.slice(0, 6)) {
+      const up = mode.y + 0.24 > plan.bounds[3] ? -1 : 1; // at the upper wall
+      const [x, y, wide] = [plan.x(mode.x), plan.y(mode.y + 0.24 * up), 38 * plan.ratio];
       pen.fillStyle = plan.css('--card');
       pen.fillRect(x - wide / 2, y - 9 * plan.ratio, wide, 18 * plan.ratio);
       plan.text(pen, `${Math.round(100 * mode.share)} %`, x, y, '--belief-ink', 12, 'center', '600');
