@@ -385,7 +385,7 @@ static void adaptive_doubt(struct adaptive *a, double local)
 
 static void adaptive_learn(struct adaptive *a)
 {
-    if (!a->whole && a->kidnap.proven > PROVEN && a->problem->settings.map.learn >= 0.5)
+    if (!a->whole && a->kidnap.proven > PROVEN)
         nav_map_learn(a->likelihood);
     nav_trust_learn(a->likelihood);
 }

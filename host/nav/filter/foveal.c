@@ -139,8 +139,7 @@ static void foveal_inflate(const struct foveal *f, struct nav_gaussian *g)
     g->covariance[8] = steps * f->spacing_theta * f->spacing_theta;
 }
 
-/* Equations 6 and 7: the mode, and the covariance about it. As printed the sum has no weights: 1331 points count alike,
- * and the readings matter only through which point is the mode. */
+/* Equations 6 and 7: the mode, and the covariance about it. */
 static void foveal_fit(struct foveal *f, long mode)
 {
     const struct nav_foveal_settings *s = &f->problem->settings.foveal;
@@ -148,9 +147,8 @@ static void foveal_fit(struct foveal *f, long mode)
     for (size_t p = 0; p < foveal_points(f); p++) {
         struct nav_pose pose = foveal_point(f, p);
         double d[3] = {pose.x - fitted.mean.x, pose.y - fitted.mean.y, nav_wrap(pose.theta - fitted.mean.theta)};
-        double weight = s->printed > 0.0 ? 1.0 : f->weight[p];
         for (int a = 0; a < 9; a++)
-            fitted.covariance[a] += weight * d[a / 3] * d[a % 3];
+            fitted.covariance[a] += f->weight[p] * d[a / 3] * d[a % 3];
     }
     if (s->inflate > 0.0)
         foveal_inflate(f, &fitted);

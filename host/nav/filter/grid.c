@@ -213,8 +213,6 @@ static void grid_estimate(const void *self, struct nav_estimate *out);
 /* The motion as the odometry's learned errors correct it. What is learned comes from the rows before. */
 static struct nav_motion grid_calibrated(struct grid *g, const struct nav_motion *motion)
 {
-    if (g->problem->settings.motion.calibrate < 0.5)
-        return *motion;
     struct nav_estimate now;
     grid_estimate(g, &now);
     now.confidence = g->near;

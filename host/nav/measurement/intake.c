@@ -113,10 +113,9 @@ static struct nav_motion intake_take_odometry(struct nav_intake *in, const struc
     if (arrival == LATE)
         return (struct nav_motion){.unknown_m = 0.0}; /* assumed when it did not come */
     double before = in->latest;
-    int missing = 0;
     bool onward = arrival == ON_TIME && isfinite(row->t_s);
-    if (onward && in->problem->settings.motion.gaps >= 0.5)
-        missing = nav_gaps_missing(&in->gaps, before + in->untimed * in->gaps.period_s, row->t_s);
+    double due = before + in->untimed * in->gaps.period_s;
+    int missing = onward ? nav_gaps_missing(&in->gaps, due, row->t_s) : 0;
     in->untimed = onward ? 0 : in->untimed + 1;
     if (onward)
         in->latest = row->t_s;

@@ -76,7 +76,7 @@ static double texture_novelty(const struct nav_model *model, struct nav_track *t
 {
     double weight = nav_novelty(track->moved, model->spacing);
     int best = 0;
-    if (!(weight > 0.0) || model->settings->texture.repeat < 0.5)
+    if (!(weight > 0.0))
         return weight;
     for (int k = 1; k < model->values; k++)
         best = loglik[k] > loglik[best] ? k : best;

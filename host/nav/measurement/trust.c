@@ -85,8 +85,6 @@ void nav_trust_learn(struct nav_likelihood *l)
 {
     for (int n = 0; l->track && n < l->reads; n++)
         l->track[l->read[n]].expected = trust_expected(l, l->read[n]);
-    if (l->whiskers == 0 || l->model[0].settings->trust.learn < 0.5)
-        return;
     double together = 0.0;
     for (int w = 0; w < l->whiskers; w++)
         together += l->trust[w].agreement;

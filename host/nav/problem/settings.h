@@ -14,7 +14,6 @@ struct nav_texture_settings {
     double temper;    /* exponent on a window's likelihood; 0: estimated from the windows (texture_model.c) */
     double outlier;   /* share of windows that say nothing about the tile (borders, catches) */
     double spacing_m; /* a window counts in full after the tip has moved so far since the last one */
-    double repeat;    /* 1: learns how errors of windows repeat, and counts repetitions for less (repeat.h); 0: never */
 };
 
 struct nav_radial_settings {
@@ -28,21 +27,10 @@ struct nav_normal_settings {
     double outlier; /* share of directions of surfaces that say nothing about the face */
 };
 
-struct nav_trust_settings {
-    double learn; /* 1: whiskers that keep disagreeing with a sure belief count for less (trust.h); 0: never */
-};
-
-struct nav_map_settings {
-    double
-        learn; /* 1: places where the map keeps being wrong are no longer expected as mapped (map_belief.h); 0: never */
-};
-
 struct nav_motion_settings {
     double along_m;   /* the relative odometry error keeps its value over about this distance ... */
     double turn_rad;  /* ... and this angle */
     double drift_rad; /* heading error of a straight metre, standard deviation */
-    double calibrate; /* 1: learns constant errors of the odometry (calibration.h), where the filter can */
-    double gaps;      /* 1: estimates the motion of rows that never came (gap.h); 0: takes it as none */
     double hazard;    /* probability at any row read that the robot has been put to another place */
 };
 
@@ -57,7 +45,6 @@ struct nav_foveal_settings {
     double cells;       /* per axis, odd (paper: 11) */
     double quantum_m;   /* quantisation added to each posterior covariance, standard deviation of position */
     double quantum_deg; /* quantisation added to each posterior covariance, standard deviation of heading */
-    double printed;     /* 1: equation 7 as printed, without weights */
     double inflate;     /* 1: every posterior covariance is blown up to the fovea's (the paper's shortcut) */
 };
 
@@ -75,8 +62,6 @@ struct nav_settings {
     struct nav_texture_settings texture;
     struct nav_radial_settings radial;
     struct nav_normal_settings normal;
-    struct nav_trust_settings trust;
-    struct nav_map_settings map;
     struct nav_motion_settings motion;
     struct nav_grid_settings grid;
     struct nav_foveal_settings foveal;

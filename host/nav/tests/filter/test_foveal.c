@@ -104,23 +104,6 @@ static void covariance_after(struct nav_problem *p, bool right, double covarianc
     foveal_destroy(f);
 }
 
-static void as_printed_equation_7_does_not_depend_on_the_readings(void **state)
-{
-    (void)state;
-    struct nav_problem p = quiet_room();
-    p.settings.foveal.printed = 1.0;
-    double left[9];
-    covariance_after(&p, false, left);
-    /* 1331 points about the middle: 121 times the sum of squares of -5 .. 5 spacings, and the quantisation term. */
-    assert_near(left[0], 121.0 * 110.0 * 0.025 * 0.025 + 0.0001, 1e-9);
-    assert_near(left[8], 121.0 * 110.0 * pow(NAV_PI / 20.0, 2.0) + pow(2.6 * NAV_PI / 180.0, 2.0), 1e-9);
-    double right[9];
-    covariance_after(&p, true, right);
-    /* Two points further the mode is off the middle by 0.05 m: all that a reading can change. */
-    assert_near(right[0] - left[0], 1331.0 * 0.05 * 0.05, 1e-9);
-    assert_near(right[8], left[8], 1e-9);
-}
-
 static void inflation_puts_the_fovea_in_place_of_the_posterior(void **state)
 {
     (void)state;
@@ -142,7 +125,6 @@ int main(void)
         cmocka_unit_test(a_texture_moves_the_mode_to_the_nearest_point_that_fits),
         cmocka_unit_test(it_never_looks_outside_the_fovea),
         cmocka_unit_test(a_fovea_wholly_inside_a_solid_changes_nothing),
-        cmocka_unit_test(as_printed_equation_7_does_not_depend_on_the_readings),
         cmocka_unit_test(inflation_puts_the_fovea_in_place_of_the_posterior),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
