@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+import subprocess
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +16,7 @@ from crunchbot_lab.scenes import make
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
-from benches.nav import families, judge, states, worlds  # noqa: E402
+from benches.nav import families, judge, states, worlds, worth  # noqa: E402
 from benches.nav.states import Answers  # noqa: E402
 
 ROWS = 300
@@ -164,3 +166,12 @@ def test_this_trees_state_answers():
     state = states.stated(f"{ROOT}:odometry")
     found = families.drawn(worlds.Family("some", lambda seed: MADE), 1, [state])
     assert len(found) == 1 and found[0]["rows"][1] is None  # odometry does not know that it was carried
+
+
+def test_the_switches_of_a_mechanism_fit_the_filters_as_they_are():
+    done = subprocess.run(
+        ["git", "apply", "--check", worth.PATCH], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, f"{worth.PATCH}: write it anew for what was changed: {done.stderr}"
+    given = set(re.findall(r"^\+ +ENTRY\(worth, (\w+)", worth.PATCH.read_text(), re.MULTILINE))
+    assert {switch.removeprefix("worth.").removesuffix("=0") for switch in worth.SWITCHES} <= given

@@ -63,9 +63,14 @@ ERROR, LINKER = re.compile(r"\berror\b|cannot find|not found", re.IGNORECASE), r
 @cache
 def state(*parts: str) -> str:
     """Digest of the tracked files as they are, or of these folders and files alone."""
-    names = _git("ls-files", "--", *(parts or (".", *WRITTEN))).splitlines()
+    names = tracked(*(parts or (".", *WRITTEN)))
     there = "".join(f"{name}\n" for name in names if (ROOT / name).is_file())
     return hashlib.sha256(f"{there}{_git('hash-object', '--stdin-paths', input=there)}".encode()).hexdigest()[:12]
+
+
+def tracked(*parts: str) -> list[str]:
+    """Names of the files that git has, or of those below these folders."""
+    return _git("ls-files", "--", *parts).splitlines()
 
 
 def _git(*words: str, **options) -> str:

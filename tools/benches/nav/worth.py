@@ -1,8 +1,10 @@
 """What each of several settings is worth: all of them are switched at once, each in half of the runs of every draw.
 
-    tools/benches nav_worth --runs 430 --data DIR                                     the mechanisms that can be left out
-    tools/benches nav_worth --switch trust.learn=0 --switch texture.repeat=0          these two
+    tools/benches nav_worth --runs 430 --data DIR                                      the mechanisms of `adaptive`
+    tools/benches nav_worth --switch worth.budget=0                                    one alone
+    tools/benches nav_worth --filter grid --switch worth.calibration=0                 of another filter
 
+The filters have no such settings: the bench compiles a copy of this tree that has them, by the patch beside it.
 On each draw as many states run as a Hadamard matrix has rows; a setting's worth is what the states that have it differ by
 from those that do not, so that every run tells of every setting: for seven of them a quarter of the runs that one after
 the other would take. The second half of the draws runs the opposite states: then no pair of settings that matter together
@@ -11,6 +13,9 @@ is taken for a third one. Draws, journal and --data: as of nav_families.
 
 import argparse
 import math
+import os
+import shutil
+import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,7 +28,28 @@ from .states import stated
 from .worlds import Family, all_families, recordings_option
 
 MOST = 7  # settings: eight states a draw
-SWITCHES = ("trust.learn=0", "texture.repeat=0", "motion.gaps=0")
+SWITCHES = tuple(f"worth.{name}=0" for name in ("trust", "map", "repeat", "modes", "levels", "gains", "gaps"))
+PATCH = Path(__file__).with_suffix(".patch")
+COMPILE = (  # what a state's module is made of
+    "cmake --preset release",
+    "cmake --build build/release --target whisker_static nav create",
+    ".venv/bin/python host/python/crunchbot/build_ffi.py --build-dir build/release",
+)
+
+
+def switchable() -> Path:
+    """A copy of this tree whose filters have the switches, compiled."""
+    tree = store.BENCH / "worth"
+    for file in filter(Path.is_file, (store.ROOT / name for name in store.tracked())):
+        copy = tree / file.relative_to(store.ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(file, copy)
+    if not (tree / ".venv").exists():
+        (tree / ".venv").symlink_to(store.ROOT / ".venv")
+    alone = os.environ | {"GIT_CEILING_DIRECTORIES": str(tree.parent)}  # else git takes the paths for this tree's
+    for words in (f"git apply {PATCH}", *COMPILE):
+        subprocess.run(words.split(), cwd=tree, env=alone, check=True)
+    return tree
 
 
 def hadamard(settings: int) -> np.ndarray:
@@ -67,29 +93,28 @@ def by_part(
     }
 
 
-def run(_build: Path, switch: Sequence[str], state: str, runs: int, data: Path | None, parent: str | None) -> None:
+def run(_build: Path, switch: Sequence[str], filter: str, runs: int, data: Path | None, parent: str | None) -> None:
     switch = switch or SWITCHES
     if len(switch) > MOST:
         raise SystemExit(f"--switch: {len(switch)} settings; give {MOST} at most")
-    families, commit, found = all_families(data), parent or parent_commit(), []
+    families, commit, found, tree = all_families(data), parent or parent_commit(), [], switchable()
     for half, signs in enumerate((hadamard(len(switch)), -hadamard(len(switch)))):
         words = [",".join(key for key, sign in zip(switch, row, strict=True) if sign > 0) for row in signs]
-        states = [stated(f"{state}:{one}") for one in words]
+        states = [stated(f"{tree}:{filter}:{one}") for one in words]
         draws = measure(families, runs // 2, f"{commit} {half}", states)
         found += [(name, one, signs) for name, each in draws.items() for one in each]
     summary = by_part(families, found, switch)
     for setting, parts in summary.items():
         print(f"with {setting} less without it, +- two standard errors\n{against(parts)}")
-    store.write_result("nav_worth", {"draws_of": commit, "draws": len(found), "settings": summary})
+    if switch == SWITCHES:
+        store.write_result("nav_worth", {"draws_of": commit, "draws": len(found), "settings": summary})
 
 
 def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--switch", action="append", default=[], metavar="KEY=VALUE", help=f"up to {MOST} (default: {SWITCHES})"
     )
-    parser.add_argument(
-        "--state", default=f"{store.ROOT}:adaptive", metavar="TREE:FILTER", help="(default: this tree's)"
-    )
+    parser.add_argument("--filter", default="adaptive", help="(default: %(default)s)")
     parser.add_argument("--runs", type=int, default=430, help="draws of all families together (default: %(default)s)")
     recordings_option(parser)
     parser.add_argument("--parent", metavar="COMMIT", help="whose draws; default: the parent of what is measured")
