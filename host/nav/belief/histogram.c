@@ -25,14 +25,6 @@ struct nav_blur {
     float side_turn;                                     /* weight of a neighbour in the headings' */
 };
 
-/* How far it is: the group of the line of the slice that is stored next, of lines before `end`; those before `made` are
- * written out. */
-struct nav_progress {
-    int slice, line, group, end, made;
-    uint32_t groups; /* stored */
-    long touched;
-};
-
 /* Sums of a line, by lane: mass, that times x, xx; cells with mass; heaviest cell. */
 struct nav_line_sums {
     nav_lanes mass[3], peak;
@@ -41,20 +33,17 @@ struct nav_line_sums {
 
 /* A pass under way. */
 struct nav_pass {
-    bool running;
     const struct nav_weigh *weigh;
     struct nav_blur blur;
-    struct nav_progress at;
     int *roll_x, *roll_y; /* [nh] whole cells that slices move by */
+    uint32_t groups;      /* stored so far */
+    int slice, line;      /* that is made now; lines of the slice before */
+    int made;             /* this one are written out */
     struct nav_line raw, blurred[NAV_BLUR_LINES];
-    const float *row[NAV_BLUR_LINES]; /* lines that this one takes from, */
-    int groups_end;                   /* and where their groups end */
+    const float *row[NAV_BLUR_LINES]; /* lines that this one takes from */
     struct nav_line_sums sums;
-    struct nav_pose about;
     double total;
-    long cells;
-    float heaviest; /* cell so far */
-    struct nav_pose mode;
+    long touched;
 };
 
 static void histogram_line_widen(struct nav_line *line, int begin, int end)
@@ -85,17 +74,17 @@ static bool histogram_group_any(const float *mass)
 /* Adds a group to the store, when there is room; ends a line. */
 static void histogram_store_group(struct nav_histogram *h, int group, const float *mass)
 {
-    uint32_t n = h->pass->at.groups;
+    uint32_t n = h->pass->groups;
     if (n == h->room)
         return;
     h->next.at[n] = (uint16_t)group;
     memcpy(h->next.mass + (size_t)n * NAV_LANES, mass, NAV_LANES * sizeof *mass);
-    h->pass->at.groups++;
+    h->pass->groups++;
 }
 
 static void histogram_end_line(struct nav_histogram *h, size_t line)
 {
-    h->next.first[line + 1] = h->pass->at.groups;
+    h->next.first[line + 1] = h->pass->groups;
 }
 
 /* Adds to a shift and returns the whole cells that it has gathered, at most `most` either way; beyond these the shift
@@ -138,23 +127,17 @@ double nav_shape_inside(const struct nav_shape *s)
 
 static int histogram_cells_init(struct nav_cells *c, const struct nav_shape *finest, uint32_t room)
 {
-    c->shift_x = calloc((size_t)finest->nh, sizeof *c->shift_x);
-    c->shift_y = calloc((size_t)finest->nh, sizeof *c->shift_y);
     c->first = calloc(histogram_shape_lines(finest) + 1, sizeof *c->first);
     c->at = calloc(room, sizeof *c->at);
     c->mass = calloc((size_t)room * NAV_LANES, sizeof *c->mass);
-    c->moment = calloc((size_t)finest->nh, sizeof *c->moment);
-    return c->moment && c->shift_x && c->shift_y && c->first && c->at && c->mass ? 0 : -1;
+    return c->first && c->at && c->mass ? 0 : -1;
 }
 
 static void histogram_cells_free(struct nav_cells *c)
 {
-    free(c->shift_x);
-    free(c->shift_y);
     free(c->first);
     free(c->at);
     free(c->mass);
-    free(c->moment);
 }
 
 static int histogram_line_init(struct nav_line *line, const struct nav_shape *finest)
@@ -190,8 +173,11 @@ int nav_histogram_init(struct nav_histogram *h, const struct nav_levels *levels,
     if (room > UINT32_MAX / 2 || finest.groups > UINT16_MAX)
         return -1;
     h->room = (uint32_t)room;
-    if (histogram_cells_init(&h->now, &finest, h->room) || histogram_cells_init(&h->next, &finest, h->room) ||
-        histogram_pass_init(h, &finest))
+    h->shift_x = calloc((size_t)finest.nh, sizeof *h->shift_x);
+    h->shift_y = calloc((size_t)finest.nh, sizeof *h->shift_y);
+    h->moment = calloc((size_t)finest.nh, sizeof *h->moment);
+    if (!h->shift_x || !h->shift_y || !h->moment || histogram_cells_init(&h->now, &finest, h->room) ||
+        histogram_cells_init(&h->next, &finest, h->room) || histogram_pass_init(h, &finest))
         return -1;
     nav_histogram_restart(h, level);
     return 0;
@@ -207,6 +193,9 @@ void nav_histogram_free(struct nav_histogram *h)
             histogram_line_free(&h->pass->blurred[n]);
     }
     free(h->pass);
+    free(h->shift_x);
+    free(h->shift_y);
+    free(h->moment);
     histogram_cells_free(&h->now);
     histogram_cells_free(&h->next);
 }
@@ -222,12 +211,12 @@ void nav_histogram_clear(struct nav_histogram *h, int level)
 {
     h->level = level;
     h->shape = nav_levels_shape(&h->levels, level);
-    h->pass->running = h->uniform = false;
-    h->pending_position = h->pending_heading = h->total = h->now.rotation = 0.0;
-    memset(h->now.shift_x, 0, (size_t)h->shape.nh * sizeof *h->now.shift_x);
-    memset(h->now.shift_y, 0, (size_t)h->shape.nh * sizeof *h->now.shift_y);
+    h->uniform = false;
+    h->pending_position = h->pending_heading = h->total = h->rotation = 0.0;
+    memset(h->shift_x, 0, (size_t)h->shape.nh * sizeof *h->shift_x);
+    memset(h->shift_y, 0, (size_t)h->shape.nh * sizeof *h->shift_y);
     memset(h->now.first, 0, (histogram_shape_lines(&h->shape) + 1) * sizeof *h->now.first);
-    memset(h->now.moment, 0, (size_t)h->shape.nh * sizeof *h->now.moment);
+    memset(h->moment, 0, (size_t)h->shape.nh * sizeof *h->moment);
 }
 
 void nav_histogram_restart(struct nav_histogram *h, int level)
@@ -240,13 +229,13 @@ void nav_histogram_restart(struct nav_histogram *h, int level)
     const double even[NAV_MOMENTS] = {1.0, x / 2.0, y / 2.0, x * x / 3.0, x * y / 4.0, y * y / 3.0};
     for (int p = 0; p < h->shape.nh; p++) {
         for (int k = 0; k < NAV_MOMENTS; k++)
-            h->now.moment[p][k] = even[k] / h->shape.nh;
+            h->moment[p][k] = even[k] / h->shape.nh;
     }
 }
 
 static void histogram_store_begin(struct nav_histogram *h)
 {
-    h->pass->at.groups = h->next.first[0] = 0;
+    h->pass->groups = h->next.first[0] = 0;
 }
 
 static void histogram_store_swap(struct nav_histogram *h)
@@ -260,14 +249,6 @@ static void histogram_store_swap(struct nav_histogram *h)
 uint32_t nav_histogram_groups(const struct nav_histogram *h)
 {
     return h->now.first[histogram_shape_lines(&h->shape)];
-}
-
-static void histogram_copy_place(struct nav_histogram *h)
-{
-    h->next.rotation = h->now.rotation;
-    memcpy(h->next.shift_x, h->now.shift_x, (size_t)h->shape.nh * sizeof *h->now.shift_x);
-    memcpy(h->next.shift_y, h->now.shift_y, (size_t)h->shape.nh * sizeof *h->now.shift_y);
-    memcpy(h->next.moment, h->now.moment, (size_t)h->shape.nh * sizeof *h->now.moment);
 }
 
 /* Stores a line written out, and empties it. */
@@ -293,7 +274,6 @@ void nav_histogram_take(struct nav_histogram *h)
 {
     struct nav_line *line = &h->pass->raw;
     size_t cells = (size_t)h->shape.groups * NAV_LANES;
-    histogram_copy_place(h);
     histogram_store_begin(h);
     for (size_t n = 0; n < histogram_shape_lines(&h->shape); n++) {
         memcpy(line->cell, h->next.mass + n * cells, cells * sizeof *line->cell);
@@ -318,9 +298,9 @@ static void histogram_write_out(const struct nav_histogram *h, size_t number, st
 static int64_t histogram_line_of(const struct nav_histogram *h, struct nav_pose pose, int *cell)
 {
     const struct nav_shape *s = &h->shape;
-    double turns = (pose.theta - h->now.rotation) / (2.0 * NAV_PI);
+    double turns = (pose.theta - h->rotation) / (2.0 * NAV_PI);
     int p = (int)((turns - floor(turns)) * s->nh) % s->nh;
-    double i = floor((pose.x - h->now.shift_x[p]) / s->cell), j = floor((pose.y - h->now.shift_y[p]) / s->cell);
+    double i = floor((pose.x - h->shift_x[p]) / s->cell), j = floor((pose.y - h->shift_y[p]) / s->cell);
     if (!(i >= 0.0 && j >= 0.0 && i < s->nx && j < s->ny))
         return -1;
     *cell = (int)i;
@@ -333,7 +313,6 @@ void nav_histogram_add(struct nav_histogram *h, struct nav_grain *grain, int32_t
     struct nav_line *line = &h->pass->raw;
     size_t lines = histogram_shape_lines(&h->shape);
     int cell = 0;
-    histogram_copy_place(h);
     histogram_store_begin(h);
     memset(h->next.first + 1, 0, lines * sizeof *h->next.first);
     for (int32_t n = 0; n < count; n++) {
@@ -343,8 +322,7 @@ void nav_histogram_add(struct nav_histogram *h, struct nav_grain *grain, int32_t
         grain[n].next = (int32_t)h->next.first[at + 1] - 1;
         h->next.first[at + 1] = (uint32_t)n + 1;
         h->total += grain[n].mass;
-        double x = grain[n].pose.x - h->about.x, y = grain[n].pose.y - h->about.y,
-               *m = h->next.moment[at / h->shape.ny];
+        double x = grain[n].pose.x - h->about.x, y = grain[n].pose.y - h->about.y, *m = h->moment[at / h->shape.ny];
         const double parts[NAV_MOMENTS] = {1.0, x, y, x * x, x * y, y * y};
         for (int k = 0; k < NAV_MOMENTS; k++)
             m[k] += grain[n].mass * parts[k];
@@ -386,12 +364,16 @@ bool nav_histogram_refine(struct nav_histogram *h)
     if ((size_t)nav_histogram_groups(h) * 4u * (size_t)turns * 2u > h->room)
         return false;
     histogram_store_begin(h);
-    h->next.rotation = h->now.rotation;
+    for (int q = finer.nh - 1; q >= 0; q--) { /* from the last: what is read lies before what is written */
+        h->shift_x[q] = h->shift_x[q / turns];
+        h->shift_y[q] = h->shift_y[q / turns];
+        h->pass->roll_x[q] = histogram_carry(&h->shift_x[q], 0.0, finer.cell, finer.nx);
+        h->pass->roll_y[q] = histogram_carry(&h->shift_y[q], 0.0, finer.cell, finer.ny);
+        for (int k = 0; k < NAV_MOMENTS; k++)
+            h->moment[q][k] = h->moment[q / turns][k] / turns;
+    }
     for (int q = 0; q < finer.nh; q++) {
-        int p = q / turns, dx, dy;
-        h->next.shift_x[q] = h->next.shift_y[q] = 0.0;
-        dx = histogram_carry(&h->next.shift_x[q], h->now.shift_x[p], finer.cell, finer.nx);
-        dy = histogram_carry(&h->next.shift_y[q], h->now.shift_y[p], finer.cell, finer.ny);
+        int p = q / turns, dx = h->pass->roll_x[q], dy = h->pass->roll_y[q];
         for (int j = 0; j < finer.ny; j++) {
             int from = j - dy >= 0 ? (j - dy) / 2 : -1;
             h->shape = coarse;
@@ -401,10 +383,6 @@ bool nav_histogram_refine(struct nav_histogram *h)
             h->shape = finer;
             histogram_store_line(h, &h->pass->raw, (size_t)q * (size_t)finer.ny + (size_t)j);
         }
-    }
-    for (int q = 0; q < finer.nh; q++) {
-        for (int k = 0; k < NAV_MOMENTS; k++)
-            h->next.moment[q][k] = h->now.moment[q / turns][k] / turns;
     }
     h->heaviest *= 0.25f / (float)turns;
     h->cells *= 4L * turns;
@@ -427,25 +405,19 @@ double nav_histogram_fan(const struct nav_histogram *h, struct nav_pose step, do
     return h->shape.cell_theta * h->shape.cell_theta / 12.0 * distance * fmax(distance, along_m);
 }
 
-/* Store that the shifts are taken from. */
-static const struct nav_cells *histogram_pass_cells(const struct nav_histogram *h)
-{
-    return h->pass->running ? &h->next : &h->now;
-}
-
 double nav_histogram_heading(const struct nav_histogram *h, int p)
 {
-    return (p + 0.5) * h->shape.cell_theta + histogram_pass_cells(h)->rotation;
+    return (p + 0.5) * h->shape.cell_theta + h->rotation;
 }
 
 double nav_histogram_shift_x(const struct nav_histogram *h, int p)
 {
-    return histogram_pass_cells(h)->shift_x[p];
+    return h->shift_x[p];
 }
 
 double nav_histogram_shift_y(const struct nav_histogram *h, int p)
 {
-    return histogram_pass_cells(h)->shift_y[p];
+    return h->shift_y[p];
 }
 
 double nav_histogram_debt(const struct nav_histogram *h)
@@ -490,13 +462,11 @@ static void histogram_pass_shift(struct nav_histogram *h, struct nav_pose step)
 {
     struct nav_pass *pass = h->pass;
     for (int p = 0; p < h->shape.nh; p++) {
-        double heading = (p + 0.5) * h->shape.cell_theta + h->now.rotation, c = cos(heading), s = sin(heading);
-        h->next.shift_x[p] = h->now.shift_x[p];
-        h->next.shift_y[p] = h->now.shift_y[p];
-        pass->roll_x[p] = histogram_carry(&h->next.shift_x[p], c * step.x - s * step.y, h->shape.cell, h->shape.nx);
-        pass->roll_y[p] = histogram_carry(&h->next.shift_y[p], s * step.x + c * step.y, h->shape.cell, h->shape.ny);
+        double heading = nav_histogram_heading(h, p), c = cos(heading), s = sin(heading);
+        pass->roll_x[p] = histogram_carry(&h->shift_x[p], c * step.x - s * step.y, h->shape.cell, h->shape.nx);
+        pass->roll_y[p] = histogram_carry(&h->shift_y[p], s * step.x + c * step.y, h->shape.cell, h->shape.ny);
     }
-    h->next.rotation = nav_wrap(h->now.rotation + step.theta);
+    h->rotation = nav_wrap(h->rotation + step.theta);
 }
 
 static void histogram_pass_begin(struct nav_histogram *h, struct nav_pose step, const struct nav_weigh *weigh,
@@ -512,12 +482,11 @@ static void histogram_pass_begin(struct nav_histogram *h, struct nav_pose step, 
     histogram_pass_kernels(p, side, 1.0 / h->total);
     histogram_pass_shift(h, step);
     p->weigh = weigh;
-    p->about = about;
+    h->about = about;
     p->total = 0.0;
-    p->cells = 0;
-    p->heaviest = 0.0f;
-    p->at.touched = 0;
-    p->running = true;
+    h->cells = 0;
+    h->heaviest = 0.0f;
+    p->touched = 0;
     histogram_store_begin(h);
 }
 
@@ -531,9 +500,9 @@ static void histogram_pass_pour(struct nav_histogram *h, int q, int j, float wei
 {
     struct nav_pass *pass = h->pass;
     struct nav_line *out = pass->blur.reach > 0 ? &pass->raw : histogram_pass_blurred(h, j);
-    int p = pass->at.slice, cells = h->shape.nx;
-    int dx = pass->roll_x[q] + (int)floor((h->next.shift_x[q] - h->next.shift_x[p]) / h->shape.cell + 0.5);
-    int dy = pass->roll_y[q] + (int)floor((h->next.shift_y[q] - h->next.shift_y[p]) / h->shape.cell + 0.5);
+    int p = pass->slice, cells = h->shape.nx;
+    int dx = pass->roll_x[q] + (int)floor((h->shift_x[q] - h->shift_x[p]) / h->shape.cell + 0.5);
+    int dy = pass->roll_y[q] + (int)floor((h->shift_y[q] - h->shift_y[p]) / h->shape.cell + 0.5);
     if (j - dy < 0 || j - dy >= h->shape.ny)
         return;
     const uint32_t *first = h->now.first + (size_t)q * (size_t)h->shape.ny + (size_t)(j - dy);
@@ -544,7 +513,7 @@ static void histogram_pass_pour(struct nav_histogram *h, int q, int j, float wei
         *(nav_lanes *)(out->cell + i) += weight * *(const nav_lanes *)(h->now.mass + (size_t)n * NAV_LANES);
         int group = (i + NAV_LANES) / NAV_LANES - 1, last = (i + 2 * NAV_LANES - 1) / NAV_LANES - 1;
         histogram_line_widen(out, group > 0 ? group : 0, last < h->shape.groups ? last + 1 : h->shape.groups);
-        pass->at.touched += NAV_LANES;
+        pass->touched += NAV_LANES;
     }
 }
 
@@ -574,7 +543,7 @@ static void histogram_pass_blur(struct nav_histogram *h, struct nav_line *out)
         for (int t = 0; t <= 2 * reach; t++)
             sum += pass->blur.along[t] * *(const nav_lanes *)(raw->cell + g * NAV_LANES + t - reach);
         *(nav_lanes *)(out->cell + g * NAV_LANES) = sum;
-        pass->at.touched += NAV_LANES;
+        pass->touched += NAV_LANES;
     }
     histogram_pass_trim(h, out);
     histogram_line_clear(raw);
@@ -584,18 +553,18 @@ static void histogram_pass_blur(struct nav_histogram *h, struct nav_line *out)
 static void histogram_pass_make(struct nav_histogram *h)
 {
     struct nav_pass *pass = h->pass;
-    int p = pass->at.slice, nh = h->shape.nh, j = pass->at.made++;
+    int p = pass->slice, nh = h->shape.nh, j = pass->made++;
     struct nav_line *out = histogram_pass_blurred(h, j);
     histogram_line_clear(out);
     if (j < 0 || j >= h->shape.ny)
         return;
-    long before = pass->at.touched;
+    long before = pass->touched;
     histogram_pass_pour(h, p, j, 1.0f - 2.0f * pass->blur.side_turn);
     if (pass->blur.side_turn > 0.0f) {
         histogram_pass_pour(h, (p + 1) % nh, j, pass->blur.side_turn);
         histogram_pass_pour(h, (p + nh - 1) % nh, j, pass->blur.side_turn);
     }
-    if (pass->at.touched == before)
+    if (pass->touched == before)
         return;
     histogram_pass_trim(h, pass->blur.reach > 0 ? &pass->raw : out);
     if (pass->blur.reach > 0)
@@ -631,50 +600,27 @@ static void histogram_pass_extent(const struct nav_histogram *h, int extent[2])
     int nh = h->shape.nh;
     extent[0] = histogram_pass_everywhere(h) ? 0 : h->shape.ny;
     extent[1] = histogram_pass_everywhere(h) ? h->shape.ny : 0;
-    histogram_pass_widen(h, p->at.slice, p->blur.reach, extent);
+    histogram_pass_widen(h, p->slice, p->blur.reach, extent);
     for (int k = -1; k <= 1 && p->blur.side_turn > 0.0f; k += 2) /* another's shift differs by less than two cells */
-        histogram_pass_widen(h, (p->at.slice + nh + k) % nh, p->blur.reach + 2, extent);
+        histogram_pass_widen(h, (p->slice + nh + k) % nh, p->blur.reach + 2, extent);
     extent[0] = extent[0] > 0 ? extent[0] : 0;
     extent[1] = extent[1] < h->shape.ny ? extent[1] : h->shape.ny;
 }
 
-/* Stores lines of the slice before `end` as empty. */
-static void histogram_pass_skip(struct nav_histogram *h, int end)
-{
-    struct nav_pass *p = h->pass;
-    for (; p->at.line < end; p->at.line++)
-        histogram_end_line(h, (size_t)p->at.slice * (size_t)h->shape.ny + (size_t)p->at.line);
-}
-
-static void histogram_pass_begin_slice(struct nav_histogram *h)
-{
-    struct nav_pass *p = h->pass;
-    int extent[2];
-    memset(h->next.moment[p->at.slice], 0, sizeof h->next.moment[p->at.slice]);
-    histogram_pass_extent(h, extent);
-    p->at.line = 0;
-    p->at.end = extent[1];
-    histogram_pass_skip(h, extent[0] < extent[1] ? extent[0] : h->shape.ny);
-    for (int n = 0; n < NAV_BLUR_LINES && p->at.line < h->shape.ny; n++)
-        histogram_line_clear(&p->blurred[n]);
-    p->at.made = p->at.line - p->blur.reach;
-}
-
-/* Finds the groups of the line that may hold mass. */
-static void histogram_pass_open(struct nav_histogram *h)
+/* Finds the groups begin .. end - 1 of the line that may hold mass. */
+static struct nav_line histogram_pass_open(struct nav_histogram *h)
 {
     struct nav_pass *p = h->pass;
     struct nav_line all = {NULL, h->shape.groups, 0};
     for (int t = 0; t <= 2 * p->blur.reach && !h->uniform; t++) {
-        const struct nav_line *from = histogram_pass_blurred(h, p->at.line + t - p->blur.reach);
+        const struct nav_line *from = histogram_pass_blurred(h, p->line + t - p->blur.reach);
         p->row[t] = from->cell;
         histogram_line_widen(&all, from->begin, from->end);
     }
     if (histogram_pass_everywhere(h))
         histogram_line_widen(&all, 0, h->shape.groups);
     p->sums = (struct nav_line_sums){.cells = {0}};
-    p->at.group = all.begin;
-    p->groups_end = all.end;
+    return all;
 }
 
 /* What is added to a cell of the line. */
@@ -683,8 +629,8 @@ static float histogram_pass_extra(const struct nav_histogram *h, int column)
     const struct nav_pass *p = h->pass;
     if (!(p->weigh->extra > 0.0) || !p->weigh->prior)
         return (float)p->weigh->extra;
-    double x = (column + 0.5) * h->shape.cell + nav_histogram_shift_x(h, p->at.slice);
-    double y = (p->at.line + 0.5) * h->shape.cell + nav_histogram_shift_y(h, p->at.slice);
+    double x = (column + 0.5) * h->shape.cell + nav_histogram_shift_x(h, p->slice);
+    double y = (p->line + 0.5) * h->shape.cell + nav_histogram_shift_y(h, p->slice);
     return (float)(p->weigh->extra * p->weigh->prior(p->weigh->self, x, y));
 }
 
@@ -709,7 +655,7 @@ static void histogram_pass_take(struct nav_histogram *h, int g, const float *mas
 {
     struct nav_pass *p = h->pass;
     struct nav_line_sums *sums = &p->sums;
-    float x = (float)(g * NAV_LANES * h->shape.cell + h->next.shift_x[p->at.slice] - p->about.x);
+    float x = (float)(g * NAV_LANES * h->shape.cell + h->shift_x[p->slice] - h->about.x);
     nav_lanes held = *(const nav_lanes *)mass, middle;
     for (int k = 0; k < NAV_LANES; k++)
         middle[k] = (float)k + 0.5f;
@@ -728,11 +674,11 @@ static void histogram_pass_group(struct nav_histogram *h, int g)
     struct nav_pass *p = h->pass;
     float mass[NAV_LANES], like[NAV_LANES];
     histogram_pass_mass(h, g, mass);
-    p->at.touched += NAV_LANES;
+    p->touched += NAV_LANES;
     if (!histogram_group_any(mass))
         return;
     if (p->weigh->group) {
-        p->at.touched += p->weigh->group(p->weigh->self, p->at.slice, p->at.line, g, mass, like);
+        p->touched += p->weigh->group(p->weigh->self, p->slice, p->line, g, mass, like);
         for (int k = 0; k < NAV_LANES; k++)
             mass[k] *= like[k];
     }
@@ -748,27 +694,26 @@ static void histogram_pass_survey(struct nav_histogram *h, uint32_t first)
     float peak = 0.0f;
     for (int k = 0; k < NAV_LANES; k++) {
         peak = fmaxf(peak, p->sums.peak[k]);
-        p->cells += p->sums.cells[k];
+        h->cells += p->sums.cells[k];
     }
-    if (peak <= p->heaviest)
+    if (peak <= h->heaviest)
         return;
     size_t n = (size_t)first * NAV_LANES;
-    while (n + 1 < (size_t)p->at.groups * NAV_LANES && mass[n] < peak)
+    while (n + 1 < (size_t)p->groups * NAV_LANES && mass[n] < peak)
         n++;
     int i = h->next.at[n / NAV_LANES] * NAV_LANES + (int)(n % NAV_LANES);
-    p->heaviest = peak;
-    p->mode = (struct nav_pose){(i + 0.5) * h->shape.cell + h->next.shift_x[p->at.slice],
-                                (p->at.line + 0.5) * h->shape.cell + h->next.shift_y[p->at.slice],
-                                nav_wrap(nav_histogram_heading(h, p->at.slice))};
+    h->heaviest = peak;
+    h->mode = (struct nav_pose){(i + 0.5) * h->shape.cell + h->shift_x[p->slice],
+                                (p->line + 0.5) * h->shape.cell + h->shift_y[p->slice],
+                                nav_wrap(nav_histogram_heading(h, p->slice))};
 }
 
-/* Ends a line: its sums go to the slice's. */
-static void histogram_pass_close(struct nav_histogram *h)
+/* The line's sums go to the slice's. */
+static void histogram_pass_close(struct nav_histogram *h, uint32_t first)
 {
     struct nav_pass *p = h->pass;
-    size_t number = (size_t)p->at.slice * (size_t)h->shape.ny + (size_t)p->at.line;
-    double sum[3] = {0.0}, *m = h->next.moment[p->at.slice];
-    double y = (p->at.line + 0.5) * h->shape.cell + h->next.shift_y[p->at.slice] - p->about.y;
+    double sum[3] = {0.0}, *m = h->moment[p->slice];
+    double y = (p->line + 0.5) * h->shape.cell + h->shift_y[p->slice] - h->about.y;
     for (int k = 0; k < 3; k++) {
         for (int n = 0; n < NAV_LANES; n++)
             sum[k] += (double)p->sums.mass[k][n];
@@ -777,32 +722,35 @@ static void histogram_pass_close(struct nav_histogram *h)
     for (int k = 0; k < NAV_MOMENTS; k++)
         m[k] += parts[k];
     p->total += sum[0];
-    histogram_pass_survey(h, h->next.first[number]);
-    histogram_end_line(h, number);
-    p->at.line++;
+    histogram_pass_survey(h, first);
 }
 
 static void histogram_pass_line(struct nav_histogram *h)
 {
     struct nav_pass *p = h->pass;
-    while (!h->uniform && p->at.made <= p->at.line + p->blur.reach)
+    uint32_t first = p->groups;
+    while (!h->uniform && p->made <= p->line + p->blur.reach)
         histogram_pass_make(h);
-    histogram_pass_open(h);
-    for (; p->at.group < p->groups_end; p->at.group++)
-        histogram_pass_group(h, p->at.group);
-    histogram_pass_close(h);
+    struct nav_line groups = histogram_pass_open(h);
+    for (int g = groups.begin; g < groups.end; g++)
+        histogram_pass_group(h, g);
+    histogram_pass_close(h, first);
 }
 
-static void histogram_pass_end(struct nav_histogram *h)
+static void histogram_pass_slice(struct nav_histogram *h)
 {
     struct nav_pass *p = h->pass;
-    p->running = false;
-    h->total = p->total;
-    h->cells = p->cells;
-    h->about = p->about;
-    h->heaviest = p->heaviest;
-    h->mode = p->mode;
-    histogram_store_swap(h);
+    int extent[2];
+    memset(h->moment[p->slice], 0, sizeof h->moment[p->slice]);
+    histogram_pass_extent(h, extent);
+    for (int n = 0; n < NAV_BLUR_LINES; n++)
+        histogram_line_clear(&p->blurred[n]);
+    p->made = extent[0] - p->blur.reach;
+    for (p->line = 0; p->line < h->shape.ny; p->line++) {
+        if (p->line >= extent[0] && p->line < extent[1])
+            histogram_pass_line(h);
+        histogram_end_line(h, (size_t)p->slice * (size_t)h->shape.ny + (size_t)p->line);
+    }
 }
 
 long nav_histogram_pass(struct nav_histogram *h, struct nav_pose step, const struct nav_weigh *weigh,
@@ -810,12 +758,9 @@ long nav_histogram_pass(struct nav_histogram *h, struct nav_pose step, const str
 {
     struct nav_pass *p = h->pass;
     histogram_pass_begin(h, step, weigh, about);
-    for (p->at.slice = 0; p->at.slice < h->shape.nh; p->at.slice++) {
-        histogram_pass_begin_slice(h);
-        while (p->at.line < p->at.end)
-            histogram_pass_line(h);
-        histogram_pass_skip(h, h->shape.ny);
-    }
-    histogram_pass_end(h);
-    return p->at.touched;
+    for (p->slice = 0; p->slice < h->shape.nh; p->slice++)
+        histogram_pass_slice(h);
+    h->total = p->total;
+    histogram_store_swap(h);
+    return p->touched;
 }

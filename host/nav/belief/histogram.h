@@ -42,15 +42,11 @@ size_t nav_shape_cells(const struct nav_shape *);
 /* Counts the cells without those. */
 double nav_shape_inside(const struct nav_shape *);
 
-/* Mass, cell by cell. Cell i of line j of slice p is centred at ((i + 1/2) cell + shift_x[p], (j + 1/2) cell +
- * shift_y[p]), its heading is (p + 1/2) cell_theta + rotation. */
+/* Mass, cell by cell. */
 struct nav_cells {
-    double rotation;
-    double *shift_x, *shift_y;     /* [nh] m, within half a cell */
-    uint32_t *first;               /* [nh * ny + 1] groups of line n: first[n] .. first[n + 1] - 1 */
-    uint16_t *at;                  /* [room] a group's place in its line */
-    float *mass;                   /* [room][NAV_LANES] */
-    double (*moment)[NAV_MOMENTS]; /* [nh] relative to `about` of the histogram */
+    uint32_t *first; /* [nh * ny + 1] groups of line n: first[n] .. first[n + 1] - 1 */
+    uint16_t *at;    /* [room] a group's place in its line */
+    float *mass;     /* [room][NAV_LANES] */
 };
 
 /* What a pass does besides moving. */
@@ -81,14 +77,19 @@ struct nav_histogram {
     uint32_t room; /* groups */
     bool uniform;  /* and not written out */
     struct nav_cells now, next;
+    /* Cell i of line j of slice p is centred at ((i + 1/2) cell + shift_x[p], (j + 1/2) cell + shift_y[p]), its heading
+     * is (p + 1/2) cell_theta + rotation. */
+    double rotation;
+    double *shift_x, *shift_y; /* [nh] m, within half a cell */
     struct nav_pass *pass;
     double pending_position, pending_heading; /* variance not yet added, m^2 per axis, rad^2 */
     /* What the last pass found: */
-    struct nav_pose about; /* near it */
-    double total;          /* mass of all cells, in the cells' unit; */
-    long cells;            /* those that hold any */
-    struct nav_pose mode;  /* centre of the heaviest cell, */
-    float heaviest;        /* and what it holds */
+    struct nav_pose about;         /* near it */
+    double (*moment)[NAV_MOMENTS]; /* [nh] relative to that */
+    double total;                  /* mass of all cells, in the cells' unit; */
+    long cells;                    /* those that hold any */
+    struct nav_pose mode;          /* centre of the heaviest cell, */
+    float heaviest;                /* and what it holds */
 };
 
 /* Begins uniform at level `level`, whose cells there is room for, and `spare` more. 0, or -1 without memory or when
@@ -133,7 +134,7 @@ double nav_histogram_debt(const struct nav_histogram *);
  * `along_m`: as nav_motion_settings has it. */
 double nav_histogram_fan(const struct nav_histogram *, struct nav_pose step, double along_m);
 
-/* Heading of a slice, rad, not wrapped, and its shift, m: while a pass is under way, those after it. */
+/* Heading of a slice, rad, not wrapped, and its shift, m. */
 double nav_histogram_heading(const struct nav_histogram *, int slice);
 double nav_histogram_shift_x(const struct nav_histogram *, int slice);
 double nav_histogram_shift_y(const struct nav_histogram *, int slice);

@@ -5,11 +5,6 @@
 #include "histogram.h"
 #include "problem.h"
 
-static double histogram_stats_heading(const struct nav_histogram *h, int p)
-{
-    return (p + 0.5) * h->shape.cell_theta + h->now.rotation;
-}
-
 /* Cells of a slice and a line with their mass. */
 struct visit {
     const struct nav_histogram *h;
@@ -22,15 +17,15 @@ static void histogram_visit_line(const struct visit *v, int p, int j)
     const struct nav_histogram *h = v->h;
     size_t line = (size_t)p * (size_t)h->shape.ny + (size_t)j;
     double cell = h->shape.cell, each = h->total / nav_shape_inside(&h->shape);
-    struct nav_pose at = {0.0, (j + 0.5) * cell + h->now.shift_y[p], nav_wrap(histogram_stats_heading(h, p))};
+    struct nav_pose at = {0.0, (j + 0.5) * cell + h->shift_y[p], nav_wrap(nav_histogram_heading(h, p))};
     for (int i = 0; i < h->shape.nx && h->uniform; i++) {
-        at.x = (i + 0.5) * cell + h->now.shift_x[p];
+        at.x = (i + 0.5) * cell + h->shift_x[p];
         v->take(v->self, at, each);
     }
     for (uint32_t n = h->now.first[line]; n < h->now.first[line + 1] && !h->uniform; n++) {
         for (int k = 0; k < NAV_LANES; k++) {
             double mass = (double)h->now.mass[(size_t)n * NAV_LANES + (size_t)k];
-            at.x = (h->now.at[n] * NAV_LANES + k + 0.5) * cell + h->now.shift_x[p];
+            at.x = (h->now.at[n] * NAV_LANES + k + 0.5) * cell + h->shift_x[p];
             if (mass > 0.0)
                 v->take(v->self, at, mass);
         }
@@ -104,10 +99,10 @@ double nav_histogram_near(const struct nav_histogram *h, struct nav_pose pose, s
     struct near near = {.pose = pose};
     const struct visit v = {h, histogram_near_take, &near};
     for (int p = 0; p < h->shape.nh; p++) {
-        near.turn = nav_wrap(histogram_stats_heading(h, p) - pose.theta);
+        near.turn = nav_wrap(nav_histogram_heading(h, p) - pose.theta);
         if (fabs(near.turn) > NAV_NEAR_RAD)
             continue;
-        double at = (pose.y - h->now.shift_y[p]) / h->shape.cell, reach = NAV_NEAR_M / h->shape.cell;
+        double at = (pose.y - h->shift_y[p]) / h->shape.cell, reach = NAV_NEAR_M / h->shape.cell;
         int begin = (int)fmax(floor(at - reach), 0.0), end = (int)fmin(ceil(at + reach) + 1.0, h->shape.ny);
         for (int j = begin; j < end; j++)
             histogram_visit_line(&v, p, j);
@@ -137,13 +132,13 @@ double nav_histogram_within(const struct nav_histogram *h, const struct nav_pend
     struct within within = {.each = histogram_kernel(h, pending)};
     const struct visit v = {h, histogram_within_take, &within};
     for (int p = 0; p < h->shape.nh && h->total > 0.0; p++) {
-        double heading = histogram_stats_heading(h, p);
+        double heading = nav_histogram_heading(h, p);
         within.turn = nav_wrap(heading + pending->step.theta - pose.theta);
         if (fabs(within.turn) > NAV_NEAR_RAD + NAV_COMPONENT_REACH * within.each.sigma_rad)
             continue;
         const struct nav_pose moved = nav_compose((struct nav_pose){0.0, 0.0, heading}, pending->step);
         within.pose = (struct nav_pose){pose.x - moved.x, pose.y - moved.y, 0.0};
-        double at = (within.pose.y - h->now.shift_y[p]) / h->shape.cell;
+        double at = (within.pose.y - h->shift_y[p]) / h->shape.cell;
         double reach = (NAV_NEAR_M + NAV_COMPONENT_REACH * within.each.sigma_m) / h->shape.cell;
         int begin = (int)fmax(fmin(floor(at - reach), h->shape.ny), 0.0);
         int end = (int)fmax(fmin(ceil(at + reach) + 1.0, h->shape.ny), 0.0);
@@ -171,8 +166,8 @@ static void histogram_moved(const struct nav_histogram *h, struct nav_pose step,
     double sums[6] = {0.0};
     for (int p = 0; p < h->shape.nh; p++) {
         const struct nav_pose moved =
-            nav_compose((struct nav_pose){h->about.x, h->about.y, histogram_stats_heading(h, p)}, step);
-        histogram_add_moments(h->now.moment[p], pose.x - moved.x, pose.y - moved.y, nav_wrap(moved.theta - pose.theta),
+            nav_compose((struct nav_pose){h->about.x, h->about.y, nav_histogram_heading(h, p)}, step);
+        histogram_add_moments(h->moment[p], pose.x - moved.x, pose.y - moved.y, nav_wrap(moved.theta - pose.theta),
                               sums);
     }
     for (int k = 0; k < 6; k++)

@@ -51,9 +51,9 @@ static void dense_take(void *self, struct nav_pose at, double mass)
 {
     const struct dense *d = self;
     const struct nav_shape *s = &d->h->shape;
-    int p = (int)lround((at.theta - d->h->now.rotation) / s->cell_theta - 0.5 + 4.0 * s->nh) % s->nh;
-    int i = (int)lround((at.x - d->h->now.shift_x[p]) / s->cell - 0.5);
-    int j = (int)lround((at.y - d->h->now.shift_y[p]) / s->cell - 0.5);
+    int p = (int)lround((at.theta - d->h->rotation) / s->cell_theta - 0.5 + 4.0 * s->nh) % s->nh;
+    int i = (int)lround((at.x - d->h->shift_x[p]) / s->cell - 0.5);
+    int j = (int)lround((at.y - d->h->shift_y[p]) / s->cell - 0.5);
     assert_in_range(i, 0, s->nx - 1);
     assert_in_range(j, 0, s->ny - 1);
     d->cell[(p * s->ny + j) * s->nx + i] += mass;

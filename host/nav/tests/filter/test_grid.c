@@ -174,7 +174,7 @@ static void motion_put_off_is_kept_exactly(void **state)
     assert_near(after.pose.x, walked.x, 1e-12);
     assert_near(after.pose.theta, walked.theta, 1e-12);
     assert_true(after.covariance[0] > before.covariance[0]);
-    assert_near(g->histogram.now.rotation, 0.0, 0.0);
+    assert_near(g->histogram.rotation, 0.0, 0.0);
     grid_destroy(g);
 }
 
@@ -304,11 +304,11 @@ static void a_cells_likelihood_is_the_mean_of_its_sub_poses_where_they_now_are(v
     const double texture[] = {0.0, -50.0}, distance = 0.1, weight[] = {1.0, 1.0};
     const double *reading[] = {texture, &distance};
     for (int s = 0; s < H; s++) {
-        g->histogram.now.shift_x[s] = 0.021 + 0.009 * s;
-        g->histogram.now.shift_y[s] = -0.016 - 0.01 * s;
+        g->histogram.shift_x[s] = 0.021 + 0.009 * s;
+        g->histogram.shift_y[s] = -0.016 - 0.01 * s;
     }
     g->histogram.uniform = true;
-    g->histogram.now.rotation = 0.3;
+    g->histogram.rotation = 0.3;
     grid_update(g, &(struct nav_evidence){.reading = reading, .weight = weight});
     double all = 0.0, worst = 0.0;
     static double belief[CELLS];
