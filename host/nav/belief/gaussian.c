@@ -69,7 +69,8 @@ void nav_gaussian_covariance(const struct nav_gaussian *g, struct nav_pose about
         out[k] = g->covariance[k] + off[k / 3] * off[k % 3];
 }
 
-void nav_gaussian_root(const double p[9], double root[9])
+/* Cholesky factor of a covariance, lower triangular, row-major; what rounding has made negative counts as nothing. */
+static void gaussian_root(const double p[9], double root[9])
 {
     double a = sqrt(fmax(p[0], 1e-18)), b = p[3] / a, d = p[6] / a;
     double c = sqrt(fmax(p[4] - b * b, 1e-18)), e = (p[7] - d * b) / c;
@@ -77,7 +78,8 @@ void nav_gaussian_root(const double p[9], double root[9])
     memcpy(root, out, sizeof out);
 }
 
-struct nav_pose nav_gaussian_at(const struct nav_gaussian *g, const double l[9], const double z[3])
+/* The pose that a standard normal `z` stands for. l: the root of the covariance. */
+static struct nav_pose gaussian_at(const struct nav_gaussian *g, const double l[9], const double z[3])
 {
     return (struct nav_pose){g->mean.x + l[0] * z[0], g->mean.y + l[3] * z[0] + l[4] * z[1],
                              nav_wrap(g->mean.theta + l[6] * z[0] + l[7] * z[1] + l[8] * z[2])};
@@ -104,14 +106,14 @@ long nav_gaussian_components(const struct nav_gaussian *g, struct nav_component 
 {
     enum { ALL = ACROSS * ACROSS * TURNS };
     double l[9], share[ACROSS], share_turn[TURNS], spacing = 6.0 / (ACROSS - 1), spacing_turn = 6.0 / (TURNS - 1);
-    nav_gaussian_root(g->covariance, l);
+    gaussian_root(g->covariance, l);
     gaussian_shares(ACROSS, 1.0, share);
     gaussian_shares(TURNS, 1.0 - TURN_KERNEL * TURN_KERNEL * spacing_turn * spacing_turn, share_turn);
     for (int n = 0; n < ALL && n < room; n++) {
         int i = n / TURNS / ACROSS, j = n / TURNS % ACROSS, k = n % TURNS;
         const double z[3] = {spacing * (i - ACROSS / 2), spacing * (j - ACROSS / 2), spacing_turn * (k - TURNS / 2)};
         out[n] = (struct nav_component){
-            .pose = nav_gaussian_at(g, l, z),
+            .pose = gaussian_at(g, l, z),
             .sigma_m = spacing / sqrt(12.0) * fmax(hypot(l[0], l[3]), l[4]), /* no gaps along the long axis */
             .sigma_rad = TURN_KERNEL * spacing_turn * l[8],
             .mass = share[i] * share[j] * share_turn[k],

@@ -7,9 +7,9 @@
 #include "intake.h"
 #include "mixture.h"
 
-static const struct nav_filter_ops *const FILTERS[] = {&nav_odometry_filter, &nav_ekf_filter,  &nav_ukf_filter,
-                                                       &nav_foveal_filter,   &nav_grid_filter, &nav_particle_filter,
-                                                       &nav_adaptive_filter};
+static const struct nav_filter_ops *const FILTERS[] = {&nav_odometry_filter, &nav_ekf_filter,
+                                                       &nav_foveal_filter,   &nav_grid_filter,
+                                                       &nav_particle_filter, &nav_adaptive_filter};
 
 #define COUNT ((int)(sizeof FILTERS / sizeof FILTERS[0]))
 

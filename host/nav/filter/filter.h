@@ -60,7 +60,6 @@ struct nav_filter_ops {
 
 extern const struct nav_filter_ops nav_odometry_filter; /* dead reckoning from the prior's mean */
 extern const struct nav_filter_ops nav_ekf_filter;      /* Kalman: ranges and border crossings, derivatives */
-extern const struct nav_filter_ops nav_ukf_filter;      /* the same by the unscented transform */
 extern const struct nav_filter_ops nav_foveal_filter;   /* the paper's, equations 5-7 */
 extern const struct nav_filter_ops nav_grid_filter;     /* exact, equation 4 */
 extern const struct nav_filter_ops nav_particle_filter; /* Monte-Carlo localisation */

@@ -1,5 +1,5 @@
-/* Filters that hold one Gaussian and correct it by scalar sightings: an extended and an unscented Kalman filter, which
- * differ only in how they linearise, and dead reckoning, which corrects nothing.
+/* Filters that hold one Gaussian: an extended Kalman filter, which corrects it by scalar sightings, and dead reckoning,
+ * which corrects nothing.
  *
  * Ranges have a derivative except at corners; textures have none, and only the borders they reveal are used (see
  * borders.h), as landmark filters do with lines. Data association is the nearest border or surface within a gate. */
@@ -32,14 +32,10 @@ struct nav_kalman_linear {
     double expected, variance, cross[3];
 };
 
-struct nav_kalman;
-typedef void nav_kalman_linearise(struct nav_kalman *, const struct nav_kalman_sighting *, struct nav_kalman_linear *);
-
 struct nav_kalman {
     const struct nav_problem *problem;
     struct nav_gaussian belief;
-    nav_kalman_linearise *linearise;   /* NULL: nothing is corrected, and what follows is unused */
-    struct nav_likelihood *likelihood; /* for the texture models */
+    struct nav_likelihood *likelihood; /* for the texture models; NULL: nothing is corrected */
     double *weight;                    /* [whiskers] of the row, object whiskers left out */
     struct nav_borders borders;
     long evaluations; /* expected observations worked out for the last row */
@@ -54,14 +50,19 @@ static void kalman_destroy(void *self)
     free(k);
 }
 
-static void *kalman_create(const struct nav_problem *problem, nav_kalman_linearise *linearise)
+static void *kalman_create_none(const struct nav_problem *problem)
 {
     struct nav_kalman *k = calloc(1, sizeof *k);
+    if (k)
+        *k = (struct nav_kalman){.problem = problem, .belief = nav_mixture_prior(problem)};
+    return k;
+}
+
+static void *kalman_create_extended(const struct nav_problem *problem)
+{
+    struct nav_kalman *k = kalman_create_none(problem);
     if (!k)
         return NULL;
-    *k = (struct nav_kalman){.problem = problem, .belief = nav_mixture_prior(problem), .linearise = linearise};
-    if (!linearise)
-        return k;
     k->likelihood = nav_likelihood_new(&problem->arena, &problem->robot, &problem->settings, 0.0);
     k->weight = k->likelihood ? calloc((size_t)k->likelihood->whiskers + 1, sizeof *k->weight) : NULL;
     if (nav_borders_init(&k->borders, &problem->arena, &problem->robot) == 0 && k->weight)
@@ -128,10 +129,8 @@ static struct nav_pose kalman_shifted(struct nav_pose pose, const double d[3])
     return (struct nav_pose){pose.x + d[0], pose.y + d[1], pose.theta + d[2]};
 }
 
-/* The extended filter's: about the mean, by central differences. Not finite at a corner or an edge, where the range
- * jumps between two points. */
-static void kalman_linearise_mean(struct nav_kalman *k, const struct nav_kalman_sighting *s,
-                                  struct nav_kalman_linear *out)
+/* About the mean, by central differences. Not finite at a corner or an edge, where the range jumps. */
+static void kalman_linearise(struct nav_kalman *k, const struct nav_kalman_sighting *s, struct nav_kalman_linear *out)
 {
     static const double STEP = 1e-4, STEEPEST = 50.0; /* m and rad; m per m or rad */
     const double *p = k->belief.covariance;
@@ -151,36 +150,10 @@ static void kalman_linearise_mean(struct nav_kalman *k, const struct nav_kalman_
     }
 }
 
-/* The unscented filter's (Julier and Uhlmann): moments over the six points plus and minus sqrt(3) times the columns of
- * the covariance's root. With n = 3 and kappa = 0 the centre has no weight and all others 1/6: fourth moments fit a
- * Gaussian, and no weight is negative. */
-static void kalman_linearise_points(struct nav_kalman *k, const struct nav_kalman_sighting *s,
-                                    struct nav_kalman_linear *out)
-{
-    enum { POINTS = 6 };
-    double root[9], d[POINTS][3], value[POINTS];
-    *out = (struct nav_kalman_linear){.expected = 0.0};
-    nav_gaussian_root(k->belief.covariance, root);
-    for (int n = 0; n < POINTS; n++) {
-        for (int a = 0; a < 3; a++)
-            d[n][a] = (n % 2 ? -sqrt(3.0) : sqrt(3.0)) * root[3 * a + n / 2];
-        value[n] = kalman_expect(k, s, kalman_shifted(k->belief.mean, d[n]));
-        if (isinf(value[n]) || s->normal)
-            value[n] = isfinite(value[n]) ? value[n] : s->reach; /* nothing within reach is at least that far */
-        out->expected += value[n] / POINTS;
-    }
-    for (int n = 0; n < POINTS; n++) {
-        double off = value[n] - out->expected;
-        out->variance += off * off / POINTS;
-        for (int a = 0; a < 3; a++)
-            out->cross[a] += d[n][a] * off / POINTS;
-    }
-}
-
 /* Squared standard deviations that a sighting is off by; INFINITY where it cannot be expected. */
 static double kalman_badness(struct nav_kalman *k, const struct nav_kalman_sighting *s, struct nav_kalman_linear *l)
 {
-    k->linearise(k, s, l);
+    kalman_linearise(k, s, l);
     double off = s->z - l->expected, badness = off * off / (l->variance + s->variance);
     return isfinite(l->variance) && isfinite(badness) ? badness : (double)INFINITY;
 }
@@ -303,7 +276,7 @@ static void kalman_take(struct nav_kalman *k, const struct nav_evidence *evidenc
 static void kalman_update(void *self, const struct nav_evidence *evidence)
 {
     struct nav_kalman *k = self;
-    if (!k->linearise)
+    if (!k->likelihood)
         return;
     memcpy(k->weight, evidence->weight, (size_t)k->likelihood->sensors.first[1] * sizeof *k->weight);
     struct nav_evidence own = *evidence;
@@ -326,25 +299,9 @@ static long kalman_components(const void *self, struct nav_component *out, long 
     return nav_gaussian_components(&((const struct nav_kalman *)self)->belief, out, room);
 }
 
-static void *kalman_create_none(const struct nav_problem *problem)
-{
-    return kalman_create(problem, NULL);
-}
-
-static void *kalman_create_extended(const struct nav_problem *problem)
-{
-    return kalman_create(problem, kalman_linearise_mean);
-}
-
-static void *kalman_create_unscented(const struct nav_problem *problem)
-{
-    return kalman_create(problem, kalman_linearise_points);
-}
-
 #define KALMAN_OPS                                                                                                     \
     .destroy = kalman_destroy, .predict = kalman_predict, .update = kalman_update, .estimate = kalman_estimate,        \
     .components = kalman_components
 
 const struct nav_filter_ops nav_odometry_filter = {.name = "odometry", .create = kalman_create_none, KALMAN_OPS};
 const struct nav_filter_ops nav_ekf_filter = {.name = "ekf", .create = kalman_create_extended, KALMAN_OPS};
-const struct nav_filter_ops nav_ukf_filter = {.name = "ukf", .create = kalman_create_unscented, KALMAN_OPS};

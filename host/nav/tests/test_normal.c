@@ -115,7 +115,7 @@ static double heading_spread(const char *filter, bool reported)
 static void filters_learn_their_heading_from_it(void **state)
 {
     (void)state;
-    static const char *const FILTERS[] = {"grid", "particle", "adaptive", "foveal", "ekf", "ukf"};
+    static const char *const FILTERS[] = {"grid", "particle", "adaptive", "foveal", "ekf"};
     for (size_t n = 0; n < sizeof FILTERS / sizeof *FILTERS; n++) {
         double without = heading_spread(FILTERS[n], false), with = heading_spread(FILTERS[n], true);
         if (!(with < 0.6 * without))

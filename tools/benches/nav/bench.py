@@ -30,7 +30,6 @@ BINS = 10  # of confidence
 SIZES = [
     ("odometry", "odometry", {}, 100),
     ("ekf", "ekf", {}, 100),
-    ("ukf", "ukf", {}, 100),
     *((f"foveal {n}^3", "foveal", {"foveal.cells": n}, 100) for n in (7, 11)),
     ("foveal 15^3", "foveal", {"foveal.cells": 15}, 50),
     ("grid 10 cm", "grid", {"grid.cell_m": 0.1, "grid.cell_deg": 20}, 100),
@@ -75,7 +74,7 @@ MATRIX = [
     ("map: a wrong tile", "anchor+map-tile", 400),
     ("map: an obstacle missing", "anchor+map-obstacle", 400),
 ]
-LOOKS = dict(odometry="x:", ekf="<-.", ukf=">-.", foveal="s--", grid="o-", particle="^--", adaptive="*-")
+LOOKS = dict(odometry="x:", ekf="<-.", foveal="s--", grid="o-", particle="^--", adaptive="*-")
 PEERS = {"filterpy": "D", "particles": "v", "pfilter": "h", "mrpt": "d"}
 
 

@@ -40,7 +40,6 @@ FIRST_SEED = 5000  # nothing was developed on these
 OURS = {
     ("odometry", ""): {},
     ("ekf", ""): {},
-    ("ukf", ""): {},
     ("foveal", "11x11x11"): {},
     ("foveal inflated", "11x11x11"): {"foveal.inflate": 1.0},
     ("grid", "5 cm x 10 deg"): {},

@@ -1,5 +1,5 @@
-/* The Kalman filters where they must equal one worked out by hand, where the unscented one differs from a
- * linearisation, and what they make of textures; their state is looked at, so their source is part of this program. */
+/* The Kalman filter where it must equal one worked out by hand, and what it makes of textures; its state is looked at,
+ * so its source is part of this program. */
 #include "../filter/kalman.c"
 
 #include "near.h"
@@ -88,7 +88,7 @@ static void a_slanted_wall_turns_heading_into_range(void **state)
     struct nav_kalman *k = kalman_create_extended(&p);
     struct nav_kalman_linear l;
     const struct nav_kalman_sighting s = {.ray = 0, .reach = 1.0};
-    kalman_linearise_mean(k, &s, &l);
+    kalman_linearise(k, &s, &l);
     /* Range (1 - x) / cos(a) - 0.05: its slope is -1 / cos(a) in x, and (1 - x) sin(a) / cos(a)^2 in the heading. */
     double c = sqrt(0.75);
     assert_near(l.expected, 0.2 / c - 0.05, 1e-9);
@@ -215,70 +215,11 @@ static void a_first_window_that_was_wrong_is_no_border(void **state)
     kalman_destroy(k);
 }
 
-static void the_points_have_the_beliefs_moments(void **state)
-{
-    (void)state;
-    struct nav_problem p = facing_wall();
-    struct nav_kalman *k = kalman_create_unscented(&p);
-    const struct nav_gaussian g = {.covariance = {0.04, 0.01, -0.002, 0.01, 0.09, 0.003, -0.002, 0.003, 0.01}};
-    k->belief = g;
-    for (int upright = 0; upright < 2; upright++) { /* a border sees x or y of the robot's own place, which is linear */
-        const struct nav_kalman_sighting s = {.ray = -1, .upright = upright};
-        struct nav_kalman_linear l;
-        kalman_linearise_points(k, &s, &l);
-        assert_near(l.expected, 0.0, 1e-12);
-        assert_near(l.variance, upright ? 0.04 : 0.09, 1e-12);
-        for (int a = 0; a < 3; a++)
-            assert_near(l.cross[a], g.covariance[(upright ? 0 : 3) + a], 1e-12);
-    }
-    kalman_destroy(k);
-}
-
-static void unscented_a_contact_square_on_is_a_kalman_update(void **state)
-{
-    (void)state;
-    struct nav_problem p = facing_wall();
-    struct nav_kalman *k = kalman_create_unscented(&p);
-    read_distance(k, 0.14);
-    assert_contact_is_a_kalman_update(k);
-    assert_int_equal(k->evaluations, 6);
-    kalman_destroy(k);
-}
-
-static void a_heading_that_is_unsure_lengthens_the_expected_range(void **state)
-{
-    (void)state;
-    struct nav_problem p = facing_wall();
-    p.prior.sigma[0] = p.prior.sigma[1] = 1e-5;
-    p.prior.sigma[2] = 0.2;
-    struct nav_kalman *k = kalman_create_unscented(&p);
-    struct nav_kalman_linear l;
-    const struct nav_kalman_sighting s = {.ray = 0, .reach = 1.0};
-    kalman_linearise_points(k, &s, &l);
-    /* Two of six points are turned by 0.2 sqrt(3): the range grows by 0.2 (1 / cos - 1) there, as a straight line of
-     * derivatives would never say. */
-    assert_near(l.expected, 0.15 + (2.0 / 6.0) * 0.2 * (1.0 / cos(0.2 * sqrt(3.0)) - 1.0), 1e-6);
-    assert_near(l.cross[2], 0.0, 1e-9); /* it grows to both sides */
-    kalman_destroy(k);
-}
-
-static void unscented_a_border_crossed_puts_the_tip_on_the_line(void **state)
-{
-    (void)state;
-    struct nav_problem p = behind_the_border();
-    struct nav_kalman *k = kalman_create_unscented(&p);
-    cross(k);
-    double gain = 0.0025 / (0.0025 + 0.0002); /* as worked out above */
-    assert_near(k->belief.mean.x, 0.3 + 8 * 0.02 + gain * 0.01, 1e-6);
-    assert_near(k->belief.covariance[0], 0.0025 * (1.0 - gain), 1e-8);
-    kalman_destroy(k);
-}
-
 static void nothing_read_changes_nothing(void **state)
 {
     (void)state;
     struct nav_problem p = facing_wall();
-    struct nav_kalman *k = kalman_create_unscented(&p);
+    struct nav_kalman *k = kalman_create_extended(&p);
     struct nav_gaussian before = k->belief;
     kalman_update(k, &(struct nav_evidence){.reading = NULL, .weight = NOTHING_READ});
     assert_memory_equal(&before, &k->belief, sizeof before);
@@ -299,10 +240,6 @@ int main(void)
         cmocka_unit_test(of_two_textures_that_were_it_the_likelier_is_taken),
         cmocka_unit_test(a_texture_without_a_border_says_nothing),
         cmocka_unit_test(a_first_window_that_was_wrong_is_no_border),
-        cmocka_unit_test(the_points_have_the_beliefs_moments),
-        cmocka_unit_test(unscented_a_contact_square_on_is_a_kalman_update),
-        cmocka_unit_test(a_heading_that_is_unsure_lengthens_the_expected_range),
-        cmocka_unit_test(unscented_a_border_crossed_puts_the_tip_on_the_line),
         cmocka_unit_test(nothing_read_changes_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -8,7 +8,7 @@
 #include "near.h"
 #include "wander.h"
 
-enum { DRAWS = 20000, FILTERS = 7, LISTED_MOST = 400000 };
+enum { DRAWS = 20000, FILTERS = 6, LISTED_MOST = 400000 };
 static const double LARGEST = 0.02, KERNEL = 1.4, FINEST_M = 0.003; /* of components: see `judge` */
 
 static const double NOT_READ_TEXTURE[WANDER_TIPS * WANDER_CLASSES] = {NAN, NAN, NAN, NAN, NAN, NAN};

@@ -384,4 +384,4 @@ def test_arguments_are_shown_in_capitals_and_each_default_is_given_once(name):
 def test_a_shell_completes_the_names_of_filters(capsys):
     with pytest.raises(SystemExit):
         parser_of().parse_args(["--print-completion", "bash"])
-    assert re.search(r"localise___filter_choices=\(.*ukf", capsys.readouterr().out)
+    assert re.search(r"localise___filter_choices=\(.*ekf", capsys.readouterr().out)

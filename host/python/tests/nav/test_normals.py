@@ -53,7 +53,7 @@ def test_directions_lie_as_the_faces_do(made):
     assert np.array_equal(np.isnan(rows.normal[..., 0]), np.isnan(rows.normal[..., 1]))
 
 
-@pytest.mark.parametrize("name", ["grid", "particle", "adaptive", "foveal", "ekf", "ukf"])
+@pytest.mark.parametrize("name", ["grid", "particle", "adaptive", "foveal", "ekf"])
 def test_filters_use_them(made, name):
     with_them, without = (
         localise.run(name, made.scene, rows) for rows in (made.observations, replace(made.observations, normal=None))
