@@ -41,7 +41,6 @@ OWN = {
     "nav.filters.problem_of",
     "nav.mapper.OneMap._grid",
     "nav.mapper.OneMap._listed",
-    "touch.texture.change.Apart.take",
     "signals.world.World.run",
     "signals.mechanics._counts",
     "signals.mechanics.touch",

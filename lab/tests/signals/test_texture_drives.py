@@ -116,11 +116,19 @@ def test_what_is_missing_for_a_drive_is_one_clear_line(capsys, tmp_path, drives,
 
 
 def test_a_surface_without_the_speeds_of_the_others_is_named():
-    counts = {"A": 20, "B": 20}
-    assert lacking(counts, {"A": [0.1, 0.2], "B": [0.12, 0.19]}) == []
-    lines = lacking(counts, {"A": [0.1, 0.2], "B": [0.2, 0.2]})
+    many = {"A": [""] * 20, "B": [""] * 20}
+    assert lacking(many, {"A": [0.1, 0.2], "B": [0.12, 0.19]}) == []
+    lines = lacking(many, {"A": [0.1, 0.2], "B": [0.2, 0.2]})
     assert lines == ["B: no pass slower than 0.20 m/s, but others at 0.10: drive over it at that"]
-    assert lacking({"A": 30, "B": 4}, {"A": [], "B": []}) == []  # so many of both bear the level out
+    assert lacking({"A": [""] * 30, "B": [""] * 4}, {}) == []  # so many of both bear the level out
+
+
+def test_passes_over_one_tile_are_one_and_a_surface_of_one_tile_is_named_always():
+    tiles = [f"c{n}r0" for n in range(40)]
+    assert lacking({"A": tiles, "B": ["c0r1"] * 40}, {}) == [
+        "B: 1 places, 17 needed for a refusal level of 10 %: drive over 16 more of its tiles"
+    ]
+    assert len(lacking({"A": tiles[:5] * 8, "B": ["c0r1", "c1r1"] * 20}, {})) == 2
 
 
 def test_a_drive_is_learnt_from_the_ring_as_it_comes(capsys, tmp_path):

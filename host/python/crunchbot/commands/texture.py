@@ -24,7 +24,7 @@ from ..stopping import stop_on_signals
 from ..tables import TableError
 from ..touch.texture import model as texture
 from ..touch.texture import train as texture_train
-from ..touch.texture.change import notice, windows_of
+from ..touch.texture.change import notice
 from ..touch.texture.drive import INSIDE_M, Drive, Stretch, over_tiles, place_of, stated, write
 from ..touch.texture.lacking import lacking
 from ..touch.texture.spectral import HAZARD, HAZARD_LEAST, SpectralModel
@@ -122,7 +122,7 @@ def train(arguments: argparse.Namespace) -> int:
     for line in report(model) if arguments.method == "default" else ():
         print(line)
     speeds = {name: texture.speeds(some) for name, some in files.items()}
-    for line in lacking({name: len(some) for name, some in files.items()}, speeds):
+    for line in lacking({name: list(map(place_of, some)) for name, some in files.items()}, speeds):
         print(line)
     return 0
 
@@ -134,7 +134,10 @@ def add_recordings(arguments: argparse.Namespace, window_ms: float) -> bool:
     if arguments.drive and arguments.live:
         raise UserError("texture train: --drive with --live; give one of them")
     if arguments.live and not arguments.surface:
-        raise UserError("texture train: --live without --surface; name the surface that is driven over")
+        raise UserError(
+            "texture train: --live without --surface; name the surface that is driven over, or record the drive and give it by "
+            "--drive with --scene: the ring shows no poses"
+        )
     scene = load(arguments.scene) if arguments.scene else None
     names = _lanes(arguments, scene)
     drive, name = _drive(arguments)
@@ -210,12 +213,14 @@ def advance(bar: Any, done: int, of: int) -> None:
 def report(model: Any) -> list[str]:
     """Figures of recordings held out, and what there was too little data to learn, a line each."""
     f, ms = model.figures, 1000.0 / model.rate_hz
+    units = f["held_out_units"]
     lines = [
         f"held out, windows of {f['window_samples'] * ms:.4g} ms: {100 * f['held_out_accuracy']:.1f} % right, "
         f"{100 * f['refused']:.1f} % unknown, calibration error {f['calibration_error']:.3f}",
         f"held out, as soon as sure: {100 * f['sequential_accuracy']:.1f} % right after "
         f"{f['sequential_samples'] * ms:.4g} ms on average, calibration error {f['sequential_calibration_error']:.3f}",
-        f"unknown by {f['recordings']} recordings: at most {100 * f['refused_level']:.0f} % of new windows of the surfaces",
+        f"unknown by {units} {'places' if units < f['recordings'] else 'recordings'}: at most "
+        f"{100 * f['refused_level']:.0f} % of new windows of the surfaces",
     ]
     return lines + [f"not learned: {text}" for text in model.not_learned()]
 
@@ -233,54 +238,54 @@ def changes_a_window(speed_m_s: float | None, tile_m: float | None, window_ms: f
 
 
 def classify(arguments: argparse.Namespace) -> int:
-    window_ms = arguments.window_ms
-    model = texture.load(arguments.model)
-    if Path(arguments.recording).is_dir():
-        return classify_folder(arguments, model, window_ms)
-    for decision in decisions(arguments, model, [Path(arguments.recording)], window_ms):
-        if arguments.json:
-            print(json.dumps(plain(vars(decision))))
-        else:
-            print(f"{decision.t_s:.3f} s  {decision.label}  {decision.confidence:.3f}")
+    model, given = texture.load(arguments.model), Path(arguments.recording)
+    if given.is_dir():
+        heard = classify_folder(arguments, model)
+    else:
+        found, samples = decisions(arguments, model, given)
+        heard = {given: samples}
+        for decision in found:
+            text = f"{decision.t_s:.3f} s  {decision.label}  {decision.confidence:.3f}"
+            print(json.dumps(plain(vars(decision))) if arguments.json else text)
+    if isinstance(model, SpectralModel):
+        speeds, places = texture.speeds(list(heard)), list(map(place_of, heard))
+        speed_m_s = float(np.median(speeds)) if speeds else None
+        if changed := notice(model, list(heard.values()), places, speed_m_s):
+            warn(f"{given}: {changed}")
     return 0
 
 
-def decisions(arguments: argparse.Namespace, model: Any, files: list[Path], window_ms: float) -> list:
-    """Classifies recordings of one whisker; their faults are warned of, and a whisker, mount or speed not the model's."""
-    found, windows = [], []
-    for path in files:
-        t_s, samples = texture.read_recording(path, getattr(model, "columns", None), warn)
-        if samples.shape[1] != model.channels:
-            text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"
-            raise TableError(path, 1, text)
-        for fault in texture.rate_faults(t_s, model.rate_hz) if hasattr(model, "rate_hz") else ():
-            warn(f"{path}: {fault}")
-        judged = texture.classify(model, t_s, samples, window_ms, arguments.sequential)
-        if not judged:
-            warn(f"{path}: {len(samples)} samples and no decision; give a longer recording, or a shorter --window-ms")
-        found += judged
-        windows += [windows_of(model, samples)] if isinstance(model, SpectralModel) else []
-    speeds = texture.speeds(files)
-    changed = notice(model, np.concatenate(windows), float(np.median(speeds)) if speeds else None) if windows else ""
-    if changed:
-        warn(f"{files[0] if len(files) == 1 else files[0].parent}: {changed}")
-    return found
+def decisions(arguments: argparse.Namespace, model: Any, path: Path) -> tuple[list, np.ndarray]:
+    """Of a recording, and its samples; its faults are warned of."""
+    t_s, samples = texture.read_recording(path, getattr(model, "columns", None), warn)
+    if samples.shape[1] != model.channels:
+        text = f"{samples.shape[1]} channels, but the model has {model.channels}; use recordings of the same sensor"
+        raise TableError(path, 1, text)
+    for fault in texture.rate_faults(t_s, model.rate_hz) if hasattr(model, "rate_hz") else ():
+        warn(f"{path}: {fault}")
+    judged = texture.classify(model, t_s, samples, arguments.window_ms, arguments.sequential)
+    if not judged:
+        warn(f"{path}: {len(samples)} samples and no decision; give a longer recording, or a shorter --window-ms")
+    return judged, samples
 
 
-def classify_folder(arguments: argparse.Namespace, model: Any, window_ms: float) -> int:
+def classify_folder(arguments: argparse.Namespace, model: Any) -> dict[Path, np.ndarray]:
     """A row for each surface's folder: decisions, and the share of each answer in percent."""
     files = texture.surface_files(arguments.recording)
     if not files:
         raise TableError(arguments.recording, None, "no surface folder; give one folder per surface, or one CSV file")
-    answers = {}
+    answers, heard = {}, {}
     for name, some in progress_bar(files.items(), desc="classify", unit="surface", disable=None):
-        answers[name] = Counter(d.label for d in decisions(arguments, model, some, window_ms))
+        answers[name] = Counter()
+        for path in some:
+            found, heard[path] = decisions(arguments, model, path)
+            answers[name] += Counter(d.label for d in found)
     columns = [*model.classes, "unknown"]
     for line in rows(answers, columns) if arguments.json else table(answers, columns):
         print(line)
     for name in sorted(set(files) - set(model.classes)):
         warn(f"{arguments.recording}: folder '{name}' is no class of the model: {', '.join(model.classes)}")
-    return 0
+    return heard
 
 
 def rows(answers: dict[str, Counter], columns: list[str]) -> list[str]:

@@ -10,7 +10,6 @@ from .texture.spectral import SpectralModel
 STEP_COUNTS = 16.0  # MLX90333: 12 bits of angle in a 16-bit word (data sheet, front page)
 LONGEST_SAMPLES = 10_000.0  # the rest is the mean of about the last 5 s of sweeping: the drift takes minutes
 WINDOW_SAMPLES = 200  # 100 ms
-CHANGE_WINDOWS = 64  # 6.4 s of sweeping, in which a robot meets several tiles
 WINDOW_LEAST_GOOD = 150  # fewer good samples than this are no window
 FIRST_SAMPLES = 2_000.0  # and at first the model's own, as if it had been seen for 1 s
 
@@ -73,7 +72,7 @@ class SpectralFloorWhisker:
         self.silent = False  # whether the last window had no evidence, as during a catch
         self._stream = model.stream(WINDOW_SAMPLES)
         known = knows(model) and model.novelty.length == WINDOW_SAMPLES
-        self._watch = Watch(model, CHANGE_WINDOWS) if known else None
+        self._watch = Watch(model) if known else None
 
     def follow(self, samples: np.ndarray) -> None:
         """Spectra are of differences: a drifting rest is not in them."""
@@ -83,8 +82,8 @@ class SpectralFloorWhisker:
         a surface never trained."""
         (found,) = self._stream.push(window)
         self.silent = found.confidence == 0.0
-        if self._watch and not self.silent and np.isfinite(window).all():
-            self._watch.take(window)
+        if self._watch and np.isfinite(window).all():
+            self._watch.take(window, found)
         return found.loglik if not self.silent and found.novelty <= 1.0 else None
 
     @property
@@ -95,3 +94,5 @@ class SpectralFloorWhisker:
     def pause(self) -> None:
         """The next window does not follow the last."""
         self._stream.reset()
+        if self._watch:
+            self._watch.end_pass()

@@ -231,6 +231,24 @@ def test_a_limit_is_never_below_that_of_rows_of_all_lengths():
     assert limits(apart, 0.4).tolist() == ROW * [5.0]
 
 
+def test_a_place_counts_once_however_often_it_was_passed():
+    """Nine of ten passes are over one place: what they say is of one in two places."""
+    passes = [np.array([float(n)]) for n in range(10)]
+    assert conformal(passes, 0.3) == 7.0 and conformal(passes, 0.3, np.array([0] * 9 + [1])) == 9.0
+    assert conformal(passes[:4] * 5, 0.3, np.arange(20) % 4) == 3.0 and conformal(passes[:4] * 5, 0.3) == 2.0
+    rows = [[np.full(ROW, value[0])] for value in passes]
+    assert limits(rows, 0.3, np.array([0] * 9 + [1])).tolist() == ROW * [9.0] and limits(rows, 0.3)[0] == 7.0
+
+
+def test_a_pass_of_each_place_is_kept_and_each_recording_where_no_place_is_known():
+    made = {name: [hiss(s, False, g, 1200) for s in range(6)] for name, g in (("A", 0.6), ("B", 1.4))}
+    places = {"A": ["c0r0", "c1r0", "c0r0", "c2r0", "c1r0", "c3r0"], "B": ["c5r5"] * 6}
+    model = train(made, RATE_HZ, 25.0, places=places)
+    assert {name: len(some) for name, some in model.passes.items()} == {"A": 4, "B": 1}
+    assert model.figures["held_out_units"] == 4 + 6
+    assert {name: len(some) for name, some in train(made, RATE_HZ, 25.0).passes.items()} == {"A": 6, "B": 6}
+
+
 def test_a_distance_needs_two_recordings_of_a_surface_and_one_of_each():
     rng = np.random.default_rng(6)
     spreads = [Rows(drive(rng, 6.0 * (n % 2))) for n in range(4)]

@@ -9,19 +9,23 @@ PACES_APART = (
 )
 
 
-def lacking(counts: dict[str, int], speeds: dict[str, list[float]]) -> list[str]:
-    """`counts`: recordings by surface; `speeds`: of those that tell it, m/s."""
-    return [*_too_few(counts), *_not_at_all_speeds(speeds)]
+def lacking(places: dict[str, list[str]], speeds: dict[str, list[float]]) -> list[str]:
+    """`places`: by surface, of each recording, empty where not known; `speeds`: of those that tell it, m/s."""
+    return [*_too_few(places), *_not_at_all_speeds(speeds)]
 
 
-def _too_few(counts: dict[str, int]) -> list[str]:
-    """The recordings that a refusal level asks for are of all surfaces together."""
+def _too_few(places: dict[str, list[str]]) -> list[str]:
+    """What a refusal level asks for is of all surfaces together, and more than one place of each where places are known."""
     level = REFUSE_DOUBT + REFUSE_NOVEL
-    each = math.ceil((1.0 / REFUSE_DOUBT - 1.0) / len(counts))
+    each = math.ceil((1.0 / REFUSE_DOUBT - 1.0) / len(places))
+    known = {name: all(some) for name, some in places.items()}
+    counts = {name: len(set(some)) if known[name] else len(some) for name, some in places.items()}
+    few = sum(counts.values()) < each * len(counts)
     return [
-        f"{name}: {have} recordings, {each} needed for a refusal level of {100 * level:.0f} %: drive over it {each - have} times more"
+        f"{name}: {have} {'places' if known[name] else 'recordings'}, {each} needed for a refusal level of {100 * level:.0f} %: "
+        f"drive over {f'{each - have} more of its tiles' if known[name] else f'it {each - have} times more'}"
         for name, have in counts.items()
-        if have < each and sum(counts.values()) < each * len(counts)
+        if have < each and (few or (known[name] and have == 1))
     ]
 
 

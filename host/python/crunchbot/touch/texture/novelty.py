@@ -9,7 +9,6 @@ from .classifier import made, pointers
 
 ROW = lib.NAV_TEXTURE_ROW  # windows
 SHRINK = 0.3  # share of the diagonal in the covariance of windows within a row
-NORMAL_999 = 3.09  # quantile of the normal distribution
 RECORDINGS_PRIOR = 10.0  # recordings' worth of a spread alike in all directions, that the measured spread is mixed with
 
 
@@ -22,10 +21,9 @@ class Novelty:
     turn: np.ndarray  # (F, F)
     mean: np.ndarray  # (classes, F)
     row: np.ndarray  # (F,)
-    drive: float = 0.0  # limit of the mean over the rows of a drive, each over its own limit; 0: not known
 
     ARRAYS = {"limit": 1, "turn": 2, "mean": 2, "row": 1}  # and their dimensions
-    NUMBERS = ("length", "drive")
+    NUMBERS = ("length",)
 
     def native(self) -> ffi.CData:
         """A detector of its own, that has seen no window; ValueError when a size or number is impossible."""
@@ -79,40 +77,34 @@ def fit_novelty(recordings: list[Rows], labels: np.ndarray, classes: int, length
     return Novelty(length, np.ones(ROW), turn, middle @ turn, np.maximum(variance, 0.0))
 
 
-def limits(recordings: list[list[np.ndarray]], level: float) -> np.ndarray:
+def limits(recordings: list[list[np.ndarray]], level: float, units: np.ndarray | None = None) -> np.ndarray:
     """Of the distances after 1, 2, .. windows of a row, (ROW,), by `conformal`: for each recording those of its rows.
 
     Not below that of the recordings' first rows, all lengths alike: of long rows a few recordings show the farthest badly.
     """
-    all_alike = conformal([rows[0] for rows in recordings], level)
+    units = np.arange(len(recordings)) if units is None else np.asarray(units)
+    all_alike = conformal([rows[0] for rows in recordings], level, units)
     found = np.full(ROW, all_alike)
     for n in range(ROW):
-        values = [[row[n] for row in rows if len(row) > n] for rows in recordings]
-        known = [np.array(v) for v in values if v]
-        found[n] = max(all_alike, conformal(known, level) if known else 0.0)
+        values = [np.array([row[n] for row in rows if len(row) > n]) for rows in recordings]
+        known = [i for i, v in enumerate(values) if len(v)]
+        found[n] = max(all_alike, conformal([values[i] for i in known], level, units[known]) if known else 0.0)
     return found
 
 
-def conformal(values: list[np.ndarray], level: float) -> float:
-    """What a value of the next recording exceeds with a chance of at most `level`, or as small a one as so many recordings
-    can show. Each recording counts once, however many values it has, and one more lies beyond all."""
-    order = np.argsort(np.concatenate(values))
-    weight = np.concatenate([np.full(len(v), 1.0 / len(v)) for v in values])[order]
-    enough = np.cumsum(weight) >= (1.0 - level) * (len(values) + 1) - 1e-9
-    return float(np.concatenate(values)[order[int(enough.argmax()) if enough.any() else -1]])
+def conformal(values: list[np.ndarray], level: float, units: np.ndarray | None = None) -> float:
+    """What a value of the next unit exceeds with a chance of at most `level`, or as small a one as so many units can show.
+
+    `values`: of each recording. `units`: which place each is of; without, each recording is one. A unit counts once, however
+    many values it has, and one more lies beyond all."""
+    of = np.repeat(np.arange(len(values)) if units is None else units, list(map(len, values)))
+    every, of = np.concatenate(values), np.unique(of, return_inverse=True)[1]
+    order = np.argsort(every)
+    weight = (1.0 / np.bincount(of))[of][order]
+    enough = np.cumsum(weight) >= (1.0 - level) * (of.max() + 2) - 1e-9
+    return float(every[order[int(enough.argmax()) if enough.any() else -1]])
 
 
-def of_one_in_a_thousand(values: np.ndarray) -> float:
-    """What one of a thousand more is beyond, when logarithms of values (m,) are normal; 0 of fewer than three. Student's
-    quantile by the expansion of Cornish and Fisher."""
-    count, logs = len(values), np.log(values)
-    if count < 3:
-        return 0.0
-    z, freedom = NORMAL_999, count - 1
-    quantile = z + (z**3 + z) / (4.0 * freedom) + (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / (96.0 * freedom**2)
-    return float(np.exp(logs.mean() + quantile * logs.std(ddof=1) * np.sqrt(1.0 + 1.0 / count)))
-
-
-def least_level(recordings: int) -> float:
-    """The smallest level that so many recordings can show."""
-    return 1.0 / (recordings + 1)
+def least_level(units: int) -> float:
+    """The smallest level that so many units can show."""
+    return 1.0 / (units + 1)

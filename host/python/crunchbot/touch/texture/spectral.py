@@ -21,7 +21,7 @@ SURE = 0.95  # probability at which a sequential decision stops
 LOOKS = 4  # of a sequential decision in a window
 HAZARD_LEAST, HAZARD = 1e-6, 0.02  # changes of surface per window: tiles of 0.5 m at 0.1 m/s, windows of 100 ms
 LENGTH_MOST = 1 << 20  # samples of a window
-SPEED_MOST, FARTHEST = 1e3, 1e9  # m/s; of a drive, over its limit: more is no model
+SPEED_MOST, NEAREST, FARTHEST = 1e3, 1e-9, 1e9  # m/s; of a pass, over the limit: others are no model
 RANGES = {
     "rate_hz": (1e-3, 1e9),
     "window_ms": (1e-3, 1e6),
@@ -57,6 +57,9 @@ class SpectralModel:
     hazard: float = HAZARD  # changes of surface in window_ms
     novelty: Novelty | None = None
     speed_m_s: tuple[float, float] | None = None  # least and most of the recordings; None: not known
+    passes: dict[str, np.ndarray] = field(
+        default_factory=dict
+    )  # by class, of each place held out: mean novelty of a pass
     columns: list[str] = field(default_factory=list)  # names of the channels; empty: not known
     figures: dict = field(default_factory=dict)  # of held-out recordings, for the reader
 
@@ -81,6 +84,7 @@ class SpectralModel:
         content = {"format": FORMAT, "classes": self.classes, "rate_hz": self.rate_hz, "window_ms": self.window_ms}
         content |= {name: getattr(self, name) for name in ("doubt", "hazard", "speed_m_s", "columns", "figures")}
         content["limits"] = {name: _listed(self.limits[name]) for name in LIMITS}
+        content["passes"] = {name: _listed(self.passes[name]) for name in self.passes}
         content["novelty"] = None if self.novelty is None else _fields(self.novelty)
         content["classifiers"] = [_fields(r) | {"span": _listed(r.span)} for r in self.classifiers]
         put(path, json.dumps(content) + "\n")
@@ -113,6 +117,7 @@ class SpectralModel:
         fields.part("figures")
         columns = fields.names("columns", lib.NAV_TEXTURE_CHANNELS_MAX) if fields.take("columns") else []
         speed = fields.numbers("speed_m_s", 2, 0.0, SPEED_MOST) if fields.has("speed_m_s") else None
+        passes = fields.part("passes") if fields.has("passes") else Fields({})
         model = cls(
             classes,
             speed_m_s=speed,
@@ -121,6 +126,7 @@ class SpectralModel:
             figures=fields.take("figures"),
             columns=columns,
             novelty=novelty,
+            passes={c: passes.array(c, 1, NEAREST, FARTHEST) for c in classes if passes.has(c)},
             **numbers,
         )
         model.check()
@@ -140,8 +146,7 @@ def _classifier(fields: Fields) -> Classifier:
 
 def _novelty(fields: Fields) -> Novelty:
     arrays = {name: fields.array(name, dimensions) for name, dimensions in Novelty.ARRAYS.items()}
-    drive = fields.number("drive", 0.0, FARTHEST) if fields.has("drive") else 0.0
-    return Novelty(length=fields.whole("length", 1, LENGTH_MOST), drive=drive, **arrays)
+    return Novelty(length=fields.whole("length", 1, LENGTH_MOST), **arrays)
 
 
 class Stream:

@@ -11,10 +11,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from .change import mean_pass, one_of_each
 from .classifier import blocks_of, plain_features
 from .fit import Windows, fit, most_probable
 from .model import longest_run
-from .novelty import Rows, conformal, fit_novelty, least_level, limits, of_one_in_a_thousand
+from .novelty import Rows, conformal, fit_novelty, least_level, limits
 from .spectral import HAZARD, SENSOR_STOPS, Judgement, SpectralModel, forward
 
 FOLDS = 10  # or as many as there are recordings
@@ -46,7 +47,10 @@ def train(
     """
     learnt = Learnt(recordings, rate_hz, window_ms, hazard, progress, places)
     model = learnt.model()
-    model.figures = learnt.figures()
+    found = learnt.held_out(learnt.window)
+    model.figures = learnt.figures(found)
+    if model.novelty:
+        model.passes = learnt.passes(found if learnt.window == learnt.length else learnt.held_out(learnt.length))
     progress(1, 1)
     return model
 
@@ -66,7 +70,9 @@ class Learnt:
         self.classes, self.rate_hz, self.window_ms, self.hazard = list(recordings), rate_hz, window_ms, hazard
         parts = [_clean(np.asarray(r, dtype=np.float64)) for group in recordings.values() for r in group]
         self.parts, self.labels = _cut(parts, [k for k, group in enumerate(recordings.values()) for _ in group])
-        self.folds = _folds(_places(recordings, places or {}), self.labels)
+        self.places = _places(recordings, places or {})
+        self.units = _units(self.places, self.labels)
+        self.folds = self.units % min(FOLDS, self.units.max() + 1)
         asked, shortest = max(LENGTH_LEAST, round(rate_hz * window_ms / 1000.0)), min(map(len, self.parts))
         if shortest < LENGTH_LEAST:
             raise ValueError(f"the shortest recording has {shortest} samples; record each surface for some seconds")
@@ -133,41 +139,52 @@ class Learnt:
         """Of all recordings, or of all but those of a fold."""
         made, kept = self._plain(left_out), self._kept(left_out)
         for classifier in made.classifiers:
-            rows, chance = self._rows_of(classifier.length, kept)
+            rows, chance, _ = self._rows_of(classifier.length, kept)
             classifier.behind = self._behind(rows, chance)
-        rows, chance = self._rows_of(self.window, kept)
+        rows, chance, units = self._rows_of(self.window, kept)
         behind = made.classifiers[-1].behind
         sure = [-forward(loglik, behind, chance).max(axis=1) for loglik, _ in rows]
-        made.doubt = min(DOUBT, -conformal(sure, REFUSE_DOUBT)) if sure else 0.0
+        made.doubt = min(DOUBT, -conformal(sure, REFUSE_DOUBT, units)) if sure else 0.0
         if self._distances is not None:
-            limit = limits([self._distances[n] for n in kept], REFUSE_NOVEL)
-            far = np.array([np.mean([row[-1] / limit[len(row) - 1] for row in self._distances[n]]) for n in kept])
-            made.novelty = replace(self._novelty[left_out], limit=limit, drive=of_one_in_a_thousand(far))
+            limit = limits([self._distances[n] for n in kept], REFUSE_NOVEL, self.units[kept])
+            made.novelty = replace(self._novelty[left_out], limit=limit)
         return made
 
-    def _rows_of(self, length: int, kept: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float]:
-        """Log-likelihoods of windows in a row with their class, of the recordings kept, and the chance of a change between two."""
-        rows = [(self._rows[length][n], self.labels[n]) for n in kept if len(self._rows[length][n])]
-        return rows, -float(np.expm1(-1000.0 * self.hazard * length / (self.window_ms * self.rate_hz)))
+    def _rows_of(self, length: int, kept: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float, np.ndarray]:
+        """Log-likelihoods of windows in a row with their class, of the recordings kept, the chance of a change between two,
+        and the recordings' units."""
+        some = [n for n in kept if len(self._rows[length][n])]
+        chance = -float(np.expm1(-1000.0 * self.hazard * length / (self.window_ms * self.rate_hz)))
+        return [(self._rows[length][n], self.labels[n]) for n in some], chance, self.units[some]
 
     @staticmethod
     def _behind(rows: list[tuple[np.ndarray, int]], chance: float) -> float:
         return min(1.0, most_probable(lambda weight: _loss_behind(rows, weight, chance), BEHIND, BEHIND_SPREAD))
 
-    def held_out(self, sequential: bool = False) -> list[tuple[int, Judgement]]:
-        """Each decision on each recording by the model that has not seen it, with the recording's class."""
+    def held_out(self, window: int, sequential: bool = False) -> list[list[Judgement]]:
+        """Of each recording the decisions by the model that has not seen it."""
         twins = {f: self.model(f) for f in sorted(set(self.folds))}
-        each = zip(self.parts, self.labels, self.folds, strict=True)
-        return [(k, d) for part, k, f in each for d in twins[f].judge(part, self.window, sequential)]
+        return [twins[f].judge(part, window, sequential) for part, f in zip(self.parts, self.folds, strict=True)]
 
-    def figures(self) -> dict:
-        """What the model will do, for the reader."""
-        found, soon = self.held_out(), self.held_out(sequential=True)
-        level = max(REFUSE_DOUBT, least_level(len(self.parts)))
-        level += max(REFUSE_NOVEL, least_level(len(self.parts))) if self._distances is not None else 0.0
+    def passes(self, found: list[list[Judgement]]) -> dict[str, np.ndarray]:
+        """By class, how far the pass over each place is; of a surface of one place it was not held out, but one tells no
+        spread. `found`: of each recording, in windows that novelty is judged by."""
+        far, out = np.array(list(map(mean_pass, found))), {}
+        for k, name in enumerate(self.classes):
+            mine = np.flatnonzero((self.labels == k) & ~np.isnan(far))
+            chosen = one_of_each([self.places[n] for n in mine], [len(found[n]) for n in mine])
+            out[name] = np.sort(far[mine[chosen]])
+        return out
+
+    def figures(self, judged: list[list[Judgement]]) -> dict:
+        """What the model will do, for the reader; `judged`: decisions on recordings held out."""
+        found, soon = self._with_class(judged), self._with_class(self.held_out(self.window, sequential=True))
+        least = least_level(len(set(self.units)))
+        level = max(REFUSE_DOUBT, least) + (max(REFUSE_NOVEL, least) if self._distances is not None else 0.0)
         answered = [d.best == k for k, d in found if d.label >= 0]
         return {
             "recordings": len(self.parts),
+            "held_out_units": len(set(self.units)),
             "window_samples": self.window,
             "held_out_accuracy": _mean([d.best == k for k, d in found]),
             "refused": _mean([d.label < 0 for _, d in found]),
@@ -178,6 +195,9 @@ class Learnt:
             "sequential_calibration_error": _calibration(soon),
             "sequential_samples": round(float(np.mean([d.samples for _, d in soon])), 1) if soon else 0.0,
         }
+
+    def _with_class(self, judged: list[list[Judgement]]) -> list[tuple[int, Judgement]]:
+        return [(k, d) for k, some in zip(self.labels, judged, strict=True) for d in some]
 
 
 def _mean(values: list) -> float:
@@ -229,12 +249,12 @@ def _places(recordings: dict[str, list], places: dict[str, list[str]]) -> list[s
     return [p for where, count in known for p in (where * PIECES if count == 1 else where)]
 
 
-def _folds(places: list[str], labels: np.ndarray) -> np.ndarray:
-    """Of each recording, class by class: those of one place are in one fold, unless a surface has no other place."""
+def _units(places: list[str], labels: np.ndarray) -> np.ndarray:
+    """What is held out together, by number: recordings of one place, or a recording where its surface has no other place."""
     of = {k: {p for p, label in zip(places, labels, strict=True) if label == k} for k in set(labels)}
     which = [(k, p if p and len(of[k]) > 1 else n) for n, (p, k) in enumerate(zip(places, labels, strict=True))]
     order = list(dict.fromkeys(which))
-    return np.array([order.index(one) % min(FOLDS, len(order)) for one in which])
+    return np.array([order.index(one) for one in which])
 
 
 def _floor(parts: list) -> np.ndarray:
