@@ -153,12 +153,41 @@ def test_what_cannot_be_made_is_named_and_the_rest_is_made(release, tmp_path, mo
         assert f"- {line}" in page
 
 
-def test_the_second_of_two_releases_copies_no_run_of_the_first(release, monkeypatch):
+def test_a_failed_build_of_packages_leaves_no_folder_among_the_downloads(release, tmp_path, monkeypatch):
+    def run(*words, folder=None):
+        (tmp_path / "dist/debian").mkdir(parents=True)
+        (tmp_path / "dist/debian/trixie.log").write_text("no mirror")
+        raise release.CannotError("no mirror")
+
+    monkeypatch.setattr(release, "ROOT", tmp_path)
+    monkeypatch.setattr(release, "DIST", tmp_path / "dist")
+    monkeypatch.setattr(release, "run", run)
+    monkeypatch.setattr(release.os, "getuid", lambda: 0)
+    monkeypatch.setattr(release.shutil, "which", lambda name: name)
+    (tmp_path / "build").mkdir()
+    with pytest.raises(release.CannotError):
+        release.make_debian()
+    assert not list((tmp_path / "dist").iterdir()) and (tmp_path / "build/debian/trixie.log").exists()
+
+
+def test_the_second_of_two_releases_copies_no_run_of_the_first_and_the_first_stays(release, tmp_path, monkeypatch):
     """The tools of the bitstreams keep their runs; a comparison with a copy would always find the same bytes."""
     kept = []
+    (tmp_path / "build").mkdir()
     monkeypatch.setenv(release.kept_runs.VARIABLE, "")
-    monkeypatch.setattr(release, "make", lambda *_, **__: kept.append(release.kept_runs.cache_folder()) or "0  a\n")
+    monkeypatch.setattr(release, "ROOT", tmp_path)
+    monkeypatch.setattr(release, "DIST", tmp_path / "dist")
+    monkeypatch.setattr(release, "boards", lambda: ["ulx3s"])
+
+    def make(*_, **how):
+        kept.append(release.kept_runs.cache_folder())
+        (tmp_path / "dist").mkdir()
+        (tmp_path / "dist/a").write_text(str(how))
+        return "0  a\n"
+
+    monkeypatch.setattr(release, "make", make)
     monkeypatch.setattr(release.sys, "argv", ["release", "--twice", "--boards", "ulx3s"])
     assert release.main() == 0
     first, second = kept
     assert first != second and not first.is_relative_to(second) and not second.exists()
+    assert (tmp_path / "dist/a").read_text() == "{}"

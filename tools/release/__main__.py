@@ -98,10 +98,15 @@ def pack(folder: Path, name: str) -> None:
 def make_debian() -> None:
     if os.getuid() != 0 or shutil.which("mmdebstrap") is None:
         raise CannotError("needs root and mmdebstrap; run: apt-get install mmdebstrap, then: sudo make release")
-    run(sys.executable, "tools/debian")
-    for folder in sorted((DIST / "debian").glob("*/")):
-        pack(folder, f"crunchbot-debian-{folder.name}.tar")
-    shutil.rmtree(DIST / "debian")
+    made, kept = DIST / "debian", ROOT / "build/debian"
+    try:
+        run(sys.executable, "tools/debian")
+        for folder in sorted(made.glob("*/")):
+            pack(folder, f"crunchbot-debian-{folder.name}.tar")
+    finally:  # folders and logs are not downloaded
+        shutil.rmtree(kept, ignore_errors=True)
+        if made.exists():
+            shutil.move(made, kept)
 
 
 def make_site() -> None:
@@ -172,9 +177,12 @@ def main() -> int:
         sys.exit(f"release: no board '{min(unknown)}'; boards: {', '.join(known)}")
     made = make(chosen, arguments.usb_id)
     if arguments.twice:
-        with tempfile.TemporaryDirectory() as nothing:  # where no run is kept that could be copied
-            os.environ[kept_runs.VARIABLE] = nothing
+        with tempfile.TemporaryDirectory(dir=ROOT / "build") as place:
+            os.environ[kept_runs.VARIABLE] = f"{place}/runs"  # none is kept there that could be copied
+            shutil.move(DIST, f"{place}/first")  # which is what is downloaded
             again = make(chosen, arguments.usb_id, again=True)
+            shutil.rmtree(DIST)
+            shutil.move(f"{place}/first", DIST)
         first, second = (dict(line.split()[::-1] for line in text.splitlines()) for text in (made, again))
         differ = sorted(name for name, digest in second.items() if name != PAGE and first.get(name) != digest)
         if differ:
