@@ -53,7 +53,7 @@ ROUND = {
     "map": ["--seeds", "15"],
     "nav": ["--seeds", "5"],
     "nav_peers": ["--seeds", "5"],
-    "nav_families": ["--runs", "1000"],
+    "nav_families": ["--runs", "430"],
     "nav_worth": ["--runs", "86"],
     "pico": ["--frames", "100000", "--faults", "1000"],
     "ring": ["--rounds", "1"],
