@@ -113,13 +113,13 @@ def test_of_drives_like_those_of_training_no_more_are_named_than_was_said():
     rng, drives = np.random.default_rng(3), 2000
     named = 0
     for _ in range(drives):
-        passes = Passes([np.exp(rng.normal(k, 0.5, size=m)) for k, m in enumerate((5, 7, 4, 1))])
+        passes = Passes([np.expm1(rng.normal(k, 0.2, size=m)) for k, m in enumerate((5, 7, 4, 1), 1)])
         drive = rng.normal(0.0, DRIVES)
-        looks = [passes.take(k, float(np.exp(drive + rng.normal(k, 0.5)))) for k in rng.integers(4, size=150)]
+        looks = [passes.take(k, float(np.expm1(drive + rng.normal(k + 1, 0.2)))) for k in rng.integers(4, size=150)]
         named += any(look[1] for look in looks if look)
     assert 0 < named <= LEVEL * drives + 3.0 * np.sqrt(LEVEL * drives)
-    far = Passes([np.exp(rng.normal(k, 0.5, size=6)) for k in range(3)])
-    assert [look for n in range(6) if (look := far.take(n % 3, 9.0 * np.exp(n % 3)))] == [(True, True)]
+    far = Passes([np.expm1(rng.normal(k, 0.2, size=6)) for k in range(1, 4)])
+    assert [look for n in range(6) if (look := far.take(n % 3, 9.0 * np.exp(n % 3 + 1)))] == [(True, True)]
 
 
 @pytest.mark.parametrize(("chance", "freedom", "known"), [(0.05, 8, 1.860), (0.005, 8, 3.355), (0.005, 20, 2.845)])

@@ -21,7 +21,7 @@ SURE = 0.95  # probability at which a sequential decision stops
 LOOKS = 4  # of a sequential decision in a window
 HAZARD_LEAST, HAZARD = 1e-6, 0.02  # changes of surface per window: tiles of 0.5 m at 0.1 m/s, windows of 100 ms
 LENGTH_MOST = 1 << 20  # samples of a window
-SPEED_MOST, NEAREST, FARTHEST = 1e3, 1e-9, 1e9  # m/s; of a pass, over the limit: others are no model
+SPEED_MOST, FARTHEST = 1e3, 1e9  # m/s; of a pass, over the limit: more is no model
 RANGES = {
     "rate_hz": (1e-3, 1e9),
     "window_ms": (1e-3, 1e6),
@@ -126,7 +126,7 @@ class SpectralModel:
             figures=fields.take("figures"),
             columns=columns,
             novelty=novelty,
-            passes={c: passes.array(c, 1, NEAREST, FARTHEST) for c in classes if passes.has(c)},
+            passes={c: passes.array(c, 1, 0.0, FARTHEST) for c in classes if passes.has(c)},
             **numbers,
         )
         model.check()
