@@ -16,7 +16,7 @@ from crunchbot_lab.scenes import make
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
-from benches.nav import families, judge, states, worlds, worth  # noqa: E402
+from benches.nav import families, filters, judge, states, worlds, worth  # noqa: E402
 from benches.nav.states import Answers  # noqa: E402
 
 ROWS = 300
@@ -175,3 +175,26 @@ def test_the_switches_of_a_mechanism_fit_the_filters_as_they_are():
     assert done.returncode == 0, f"{worth.PATCH}: write it anew for what was changed: {done.stderr}"
     given = set(re.findall(r"^\+ +ENTRY\(worth, (\w+)", worth.PATCH.read_text(), re.MULTILINE))
     assert {switch.removeprefix("worth.").removesuffix("=0") for switch in worth.SWITCHES} <= given
+
+
+def test_the_chart_has_a_point_a_filter_and_the_netbooks_line():
+    one = {"locked": 30, "draws": 40, "error_mm": 9.0, "sure_wrong": 0.02, "instructions": 2e6}
+    states = {"adaptive": one, "grid": one | {"error_mm": None}, "ekf": one | {"instructions": None}}
+    left, middle, right = filters.draw(states).axes
+    assert [line.get_label() for line in left.lines[:-1]] == ["adaptive", "grid"]
+    assert [line.get_label() for line in middle.lines[:-1]] == ["adaptive"] and len(right.lines) == 3
+    assert (left.lines[0].get_xdata()[0], left.lines[0].get_ydata()[0]) == (2e6, 25.0)
+    assert left.lines[-1].get_xdata()[0] == 0.8e9 * 0.1
+
+
+def test_instructions_are_a_rows_and_none_where_nothing_counts_them(tmp_path, monkeypatch, capsys):
+    counter = tmp_path / "valgrind"
+    counter.write_text(
+        '#!/bin/sh\nfor word; do case $word in *out-file=*) echo "summary: 1200" >"${word#*=}";; esac; done\n'
+    )
+    counter.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    assert filters.instructions(f"{ROOT}:odometry", 3) == 1200 / filters.COUNTED_ROWS
+    monkeypatch.setenv("PATH", "")
+    assert filters.instructions(f"{ROOT}:odometry", 3) is None
+    assert "left out: instructions: valgrind" in capsys.readouterr().out

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from crunchbot.nav import localise
 from crunchbot.nav.scoring import auc
@@ -74,8 +73,6 @@ MATRIX = [
     ("map: a wrong tile", "anchor+map-tile", 400),
     ("map: an obstacle missing", "anchor+map-obstacle", 400),
 ]
-LOOKS = dict(odometry="x:", ekf="<-.", foveal="s--", grid="o-", particle="^--", adaptive="*-")
-PEERS = {"filterpy": "D", "particles": "v", "pfilter": "h", "mrpt": "d"}
 
 
 def measured(wanted: dict[tuple[str, str], dict], label: str, workers: int | None) -> dict[tuple[str, str], list[dict]]:
@@ -102,7 +99,7 @@ def by_row(done: dict[tuple[str, str], list[dict]], figures) -> dict[str, dict]:
 
 
 def point(made: list[dict]) -> dict:
-    """Of the Pareto chart: medians over runs, and the middle half of the error."""
+    """Of speed against accuracy: medians over runs, and the middle half of the error."""
     low, error, high = np.quantile([t["error_median_m"] for t in made], [0.25, 0.5, 0.75])
     us, p99 = (float(np.median([t["timing"][key] for t in made])) for key in ("step_us_median", "step_us_p99"))
     rms = float(np.median([t["error_rms_m"] for t in made]))
@@ -156,37 +153,6 @@ def matrix(seeds: int, workers: int | None) -> None:
     store.write_result("nav_matrix", {"seeds": seeds, "rows": by_row(done, stable), "confidence": confidence})
 
 
-def draw(families: dict, peers: list[dict]) -> Figure:
-    """Median us per step (p99 as a tail to the right) against median position error (middle half of the runs)."""
-    figure = Figure(figsize=(11.2, 9.2), layout="constrained")
-    for ax, (family, points) in zip(figure.subplots(2, 2).flat, families.items(), strict=True):
-        by_filter: dict[str, list] = {}
-        for title, p in sorted(points.items(), key=lambda item: item[1]["us"]):
-            name, _, size = title.partition(" ")
-            by_filter.setdefault(name, []).append((size, p))
-        for name, sizes in by_filter.items():
-            us, p99, error, low, high = (
-                np.array([p[key] for _, p in sizes])
-                for key in ("us", "us_p99", "error_m", "error_low_m", "error_high_m")
-            )
-            bars = {"xerr": [0 * us, np.maximum(p99 - us, 0)], "yerr": 1e3 * np.array([error - low, high - error])}
-            colour = {"color": "black" if name == "adaptive" else "0.4"}
-            ax.errorbar(us, 1e3 * error, **bars, fmt=LOOKS[name], **colour, lw=0.8, elinewidth=0.5, label=name)
-            for (size, _), at in zip(sizes, zip(us, 1e3 * error, strict=True), strict=True):
-                ax.annotate(size, at, textcoords="offset points", xytext=(3, 3), fontsize=5)
-        for peer in (p for p in peers if p["family"] == family and p["filter"].split()[0] in PEERS):
-            name = peer["filter"].split()[0]
-            ax.plot(
-                peer["step_us_median"], 1e3 * peer["error_median_m"], PEERS[name], color="0.4", mfc="none", label=name
-            )
-        ax.set(xscale="log", yscale="log", title=family, xlabel="us per step, median (tail: p99)")
-        ax.set_ylabel("median position error (mm)")
-        ax.grid(True, which="both", linewidth=0.3)
-    found = {label: h for ax in figure.axes for h, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(found.values(), found.keys(), loc="outside upper center", ncols=len(found), frameon=False, fontsize=7)
-    return figure
-
-
 PARTS = {"pareto": pareto, "matrix": matrix}
 
 
@@ -194,7 +160,6 @@ def run(_build: Path, only: Sequence[str] = tuple(PARTS), workers: int | None = 
     """The filters are those of the Python module."""
     for part in only:
         PARTS[part](seeds, workers)
-    store.write_chart("nav_pareto", draw(store.read_result("nav_pareto"), store.read_result("nav_peers")))
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -150,6 +150,14 @@ def report(summary: dict) -> str:
     return "\n".join(text)
 
 
+def chosen(every: dict[str, Family], only: Sequence[str]) -> dict[str, Family]:
+    """Families whose name or group holds one of these words; without words all."""
+    families = {k: f for k, f in every.items() if not only or any(word in k or word in f.group for word in only)}
+    if not families:
+        raise SystemExit(f"--only {' '.join(only)}: no family; the names are {', '.join(every)}")
+    return families
+
+
 def run(
     _build: Path,
     runs: int = 200,
@@ -161,10 +169,7 @@ def run(
     states = [stated(words) for words in state or [str(store.ROOT)]]
     if data is None:
         store.leave_out("real runs", f"give --data DIR or {RECORDINGS}, the folder of the logs")
-    every = all_families(data)
-    families = {k: f for k, f in every.items() if not only or any(word in k or word in f.group for word in only)}
-    if not families:
-        raise SystemExit(f"--only {' '.join(only)}: no family; the names are {', '.join(every)}")
+    families = chosen(all_families(data), only)
     commit = parent or parent_commit()
     print(f"draws of commit {commit}", flush=True)
     found = measure(families, runs, commit, states)

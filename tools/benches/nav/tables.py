@@ -45,6 +45,24 @@ def families() -> str:
     return lined([row for row in rows if row["family"].startswith("all")], {"families": "{family}"} | FIGURES)
 
 
+def filters() -> str:
+    """Every filter on the same draws."""
+    found = read_result("nav_filters")
+    columns = {
+        "filter": "{filter}",
+        "locked": "{locked} of {draws}",
+        "error, mm": "{error_mm:.1f}",
+        "90 % region holds, %": "{coverage:100*.0f}",
+        "sure and wrong, %": "{sure_wrong:100*.2f}",
+        "log score": "{log_score:.3f}",
+        "instructions a row": lambda one: one["instructions"] and f"{one['instructions']:.2g}",
+        "of the netbook's, %": lambda one: (
+            one["instructions"] and f"{100 * one['instructions'] / found['netbook']:.2g}"
+        ),
+    }
+    return lined(named(found["states"], "filter"), columns)
+
+
 def worth() -> str:
     """What the default filter is without each mechanism, less what it is with it."""
     found = read_result("nav_worth")["settings"]
