@@ -54,6 +54,21 @@ def honesty() -> str:
     return table(["figure", *SPREADS.values()], [*rows, ["tip or shaft right, default (eq. 3)", *shares]])
 
 
+def onsets() -> str:
+    """Pushes that go wrong: RMS and worst error of what is sure."""
+    rows = [
+        [
+            how,
+            "test, and every third of calibration" if where == "both" else "test",
+            f"{100 * one['sure']:.0f} % of {one['n']}",
+        ]
+        + [f"{one['rms_mm']:.1f}, {one['worst_mm']:.1f}", str(one["beyond_10"])]
+        for how, of in read_result("radial")["onsets"].items()
+        for where, one in of.items()
+    ]
+    return table(["pushes", "of", "sure", "RMS and worst of these, mm", "beyond 10 mm"], rows)
+
+
 def stability() -> str:
     def answer(one: dict) -> str:
         return f"{one['error_mm']:.1f}, {one['sigma_mm']:.1f}, {one['confidence']:.2f}"
