@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from crunchbot import scene as scenes
 from crunchbot.nav import localise
 
-MARKERS = "osD^vPX"
+MARKERS = "osD^vP"
 
 
 def measure(folder: Path) -> dict[str, tuple[float, float]]:
