@@ -24,7 +24,8 @@ FLOOR, OBJECT = 0, 2  # lanes
 SEED, FRAMES = 4, 2000
 NOISE = 17.0  # counts of 0.1 mT at 60 mT
 SPEED_M_S, SURFACES = 0.1, ("ROUGH", "SMOOTH")
-DRIVES, DRIVE_FRAMES = 8, 1000  # of few drives `train` says itself that it may not know the next one
+# Of so many drives `train` says itself that 13 % of new windows may be unknown, and they may all lie in one drive.
+DRIVES, NEW_DRIVES, DRIVE_FRAMES = 8, 3, 1000
 STRAIGHT = ((1.0, 0.0, 60.0),)
 MARK, MARKED = 0xC000, 0xA000  # counts of alpha: no floor bends a whisker so far
 RADII_MM, REPEATS, WITHIN_MM = (90.0, 110.0, 130.0), 2, 10.0
@@ -120,9 +121,9 @@ def test_the_page_shows_its_lanes(board):
 def test_textures_are_trained_on_its_recordings_and_recognised(board, scene, tmp_path):
     field, ring, _ = board
 
-    part_s = DRIVE_FRAMES / 2000
+    part_s, drives, right = DRIVE_FRAMES / 2000, DRIVES + NEW_DRIVES, []
     drawn = {
-        surface: next(iter(surface_drive(scene, surface, SPEED_M_S, (DRIVES + 1) * part_s, SEED, STRAIGHT).values()))
+        surface: next(iter(surface_drive(scene, surface, SPEED_M_S, drives * part_s, SEED, STRAIGHT).values()))
         for surface in SURFACES
     }
 
@@ -136,10 +137,12 @@ def test_textures_are_trained_on_its_recordings_and_recognised(board, scene, tmp
             record(surface, part, tmp_path / "recordings" / surface / f"{part}.csv")
     said("texture", "train", tmp_path / "recordings", "--out", tmp_path / "texture.json")
     for surface in SURFACES:
-        record(surface, DRIVES, tmp_path / "new.csv")
-        lines = said("texture", "classify", "--json", tmp_path / "texture.json", tmp_path / "new.csv").splitlines()
-        answers = [json.loads(line)["label"] for line in lines]
-        assert answers.count(surface) > len(answers) / 2, answers
+        for part in range(DRIVES, drives):
+            new = tmp_path / f"{surface}{part}.csv"
+            record(surface, part, new)
+            lines = said("texture", "classify", "--json", tmp_path / "texture.json", new).splitlines()
+            right += [json.loads(line)["label"] == surface for line in lines]
+    assert np.mean(right) > 0.7, right
 
 
 def test_contacts_are_calibrated_on_it_and_their_radii_estimated(board, scene, tmp_path):
