@@ -118,12 +118,14 @@ static void bank_normalise(struct nav_contact_filter *f)
         f->part[i].log_weight -= most + log(sum);
 }
 
-/* Square of the amplitude of the ringing that jumps of the tilt's rate may have left, but for what is the rate's noise.
- */
+/* Square of the amplitude of the ringing that jumps of the tilt's rate may have left: of the base's motion, whose jumps
+ * the tilt follows late, and of the tilt itself, but for what is the rate's noise. */
 static void bank_ring(struct nav_contact_filter *f, const struct nav_contact_step *step)
 {
     double circle = 6.2831853 * f->config.ring_hz, rate = (step->tilt - f->before) / step->seconds;
     f->ring *= exp(-2.0 * f->config.ring_damping * circle * step->seconds);
+    f->ring += bank_square(RATE_FIRST / circle) * f->jumps;
+    f->jumps = 0.0;
     if (!isfinite(rate))
         return;
     f->ring += fmax(0.0, bank_square(rate - f->rate) - 6.0 * step->variance / bank_square(step->seconds)) /

@@ -25,7 +25,8 @@ void nav_contact_filter_begin(struct nav_contact_filter *f)
     f->parts = f->filled = f->seen = f->equal = f->updates = 0;
     f->side = f->turned_m = f->driven_m = f->pushed_m = 0.0;
     f->last[0] = f->last[1] = NAN;
-    f->plane = 0.0;
+    f->plane = f->jumps = 0.0;
+    f->driven = false;
     f->plane_variance = PLANE_SD * PLANE_SD;
     memset(f->moved, 0, sizeof f->moved);
     memset(f->ahead, 0, sizeof f->ahead);
@@ -81,6 +82,10 @@ static void filter_block(struct nav_contact_filter *f)
     for (int k = 0; k < 2; k++)
         mean[k] = f->seen > 0 ? f->tilt[k] / f->seen : NAN;
     bool touched = fabs(mean[0]) > LEAST_SIGNAL * sqrt(variance);
+    for (int k = 0; k < 3; k++) {
+        f->first[k] = f->parts == 0 ? f->moved[k] : f->first[k];
+        f->changed[k] = f->parts == 0 ? 0.0 : f->changed[k] + f->moved[k] - f->first[k];
+    }
     if (f->parts == 0 && !filter_touched(f, mean[0], touched))
         return;
     struct nav_contact_step step = {{f->moved[0], f->side * f->moved[1]},
@@ -101,15 +106,35 @@ static void filter_block(struct nav_contact_filter *f)
         filter_plane(f, mean, variance);
 }
 
+/* How far a base that moves, or changes its motion, so (m, m, rad) moves the tip, cones. */
+static double filter_way(const struct nav_contact_filter *f, const double by[3])
+{
+    return hypot(by[0], by[1]) / f->config.cone_m + fabs(by[2]) * f->beam->tip;
+}
+
+/* A sample of the base's motion; one that is not finite stands still, and tells no change. */
+static void filter_drive(struct nav_contact_filter *f, const double base[3])
+{
+    if (!isfinite(base[0]) || !isfinite(base[1]) || !isfinite(base[2]))
+        return;
+    double jump[3];
+    for (int k = 0; k < 3; k++) {
+        jump[k] = f->driven ? base[k] - f->base[k] : 0.0;
+        f->base[k] = base[k];
+        f->ahead[k] += base[k] * f->config.sample_s;
+    }
+    f->driven = true;
+    double way = filter_way(f, jump);
+    f->jumps += way * way;
+}
+
 bool nav_contact_filter_update(struct nav_contact_filter *f, const double base[3], const double tilt[2], bool good)
 {
     if (f->filled == f->config.block / 2) { /* the block's mean tilt is that of its middle */
         memcpy(f->moved, f->ahead, sizeof f->moved);
         memset(f->ahead, 0, sizeof f->ahead);
     }
-    if (isfinite(base[0]) && isfinite(base[1]) && isfinite(base[2]))
-        for (int k = 0; k < 3; k++)
-            f->ahead[k] += base[k] * f->config.sample_s;
+    filter_drive(f, base);
     if (filter_reads(f, tilt, good)) {
         f->tilt[0] += tilt[0];
         f->tilt[1] += tilt[1];
@@ -242,6 +267,7 @@ void nav_contact_filter_answer(const struct nav_contact_filter *f, struct nav_co
     a->plane_rad = atan(f->plane);
     a->plane_sd = sqrt(f->plane_variance) / (1.0 + f->plane * f->plane);
     a->along = f->pushed_m > 0.0 ? f->pushed_m / (f->driven_m + f->turned_m) : 0.0;
+    a->changed_m = filter_way(f, f->changed) * f->config.cone_m;
     filter_speed(&moving, a);
     filter_motion(f, a);
 }

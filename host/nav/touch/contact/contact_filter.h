@@ -40,6 +40,7 @@ struct nav_contact_answer {
     double curvature, curvature_sd; /* of the surface, 1/m, a corner's counted as 0 */
     double other;                   /* probability that none of the hypotheses holds */
     double along;                   /* share of the way since the touch that pushes along the whisker, 0 to 1 */
+    double changed_m;               /* way by which the base has left the motion that it had at the touch */
     int motion;                     /* enum nav_contact_motion */
     int parts;                      /* hypotheses left; 0: no contact yet, and nothing above is known */
 };

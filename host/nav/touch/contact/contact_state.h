@@ -54,6 +54,10 @@ struct nav_contact_filter {
     double side;               /* +1 or -1: sign of the tilt on axis 0; 0: no contact yet */
     int filled, seen;          /* samples in the block; those read */
     double moved[3], ahead[3]; /* along, across (m), turned (rad): from middle to middle of blocks; since the middle */
+    bool driven;               /* a motion of the base has come */
+    double base[3], jumps;     /* the last; sum of its squared jumps in the block, (cones/s)^2 */
+    double first[3];           /* as moved, of the block of the touch; ... */
+    double changed[3];         /* ... how far the base has left this motion since, m, m, rad */
     double tilt[2];            /* sum of those read in the block */
     double last[2];
     int equal, updates;

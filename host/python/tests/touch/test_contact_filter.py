@@ -111,6 +111,23 @@ def test_a_whisker_that_may_bend_as_a_column_is_not_sure():
     assert found["taken"].mean() < 0.05
 
 
+@pytest.mark.parametrize("back_at", [290, 297, 304, 311])
+def test_a_place_of_what_moves_is_sure_once_the_base_has_changed_its_motion(back_at):
+    """Where it moves as the base stands, and where the whisker still rings from the base's jump, it is not."""
+    ticks, radius_m = 700, 0.116
+    bases = np.zeros((ticks, 3))
+    bases[back_at:, 1] = 0.024
+    y = TICK_S * np.cumsum(0.04 - bases[:, 1])
+    noise = np.random.default_rng(1).normal(0.0, 2e-4, (ticks, 2))
+    said = ContactFilter().run(
+        bases, touch(Whisker(), np.hypot(radius_m, y), np.arctan2(y, radius_m), seed=1).tilt_rad + noise
+    )
+    assert not said.sure[said.sample < back_at + 40].any() and said.sure[-1] and said.sweep[-1] > 0.9
+    off = said.point - np.column_stack([np.full(len(said.sample), radius_m), y[said.sample]])
+    far = np.einsum("ki,kij,kj->k", off, np.linalg.inv(said.point_cov), off)
+    assert far[said.sure].max() < 9.2  # all inside the 99 % region
+
+
 def test_what_is_uncertain_is_not_sure():
     bases, tilts, _ = swept(0.12)
     said = ContactFilter().run(bases, tilts)
