@@ -181,9 +181,14 @@ def run(
         store.write_result("nav_families", result)
 
 
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--runs", type=int, default=200, help="of all families together (default: %(default)s)")
-    parser.add_argument("--state", action="append", default=[], metavar="TREE[:FILTER[:KEY=VALUE,...]]")
+def draw_options(parser: argparse.ArgumentParser, runs: int) -> None:
+    """Which draws a bench of filters makes."""
+    parser.add_argument("--runs", type=int, default=runs, help="of all families together (default: %(default)s)")
     recordings_option(parser)
     parser.add_argument("--only", action="append", default=[], help="families or groups; may be repeated")
     parser.add_argument("--parent", metavar="COMMIT", help="whose draws; default: the parent of what is measured")
+
+
+def options(parser: argparse.ArgumentParser) -> None:
+    draw_options(parser, 200)
+    parser.add_argument("--state", action="append", default=[], metavar="TREE[:FILTER[:KEY=VALUE,...]]")

@@ -26,9 +26,9 @@ from crunchbot_lab.scenes.making import ROW_S
 
 from .. import store
 from ..host.bench import ATOM_HZ
-from .families import chosen, measure, parent_commit, seed_of, summed_up
+from .families import chosen, draw_options, measure, parent_commit, seed_of, summed_up
 from .states import stated
-from .worlds import all_families, recordings_option
+from .worlds import all_families
 
 ANSWER = """
 import sys
@@ -103,8 +103,5 @@ def run(
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--runs", type=int, default=86, help="of all families together (default: %(default)s)")
+    draw_options(parser, 86)
     parser.add_argument("--state", action="append", default=[], metavar="TREE:FILTER[:KEY=VALUE,...]")
-    recordings_option(parser)
-    parser.add_argument("--only", action="append", default=[], help="families or groups; may be repeated")
-    parser.add_argument("--parent", metavar="COMMIT", help="whose draws; default: the parent of what is measured")

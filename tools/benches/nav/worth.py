@@ -22,10 +22,10 @@ from pathlib import Path
 import numpy as np
 
 from .. import store
-from .families import against, measure, parent_commit
+from .families import against, chosen, draw_options, measure, parent_commit
 from .judge import COMPARED
 from .states import stated
-from .worlds import Family, all_families, recordings_option
+from .worlds import Family, all_families
 
 MOST = 7  # settings: eight states a draw
 SWITCHES = tuple(f"worth.{name}=0" for name in ("trust", "map", "repeat", "modes", "levels", "gains", "gaps"))
@@ -93,11 +93,19 @@ def by_part(
     }
 
 
-def run(_build: Path, switch: Sequence[str], filter: str, runs: int, data: Path | None, parent: str | None) -> None:
+def run(
+    _build: Path,
+    switch: Sequence[str],
+    filter: str,
+    runs: int,
+    data: Path | None,
+    only: Sequence[str],
+    parent: str | None,
+) -> None:
     switch = switch or SWITCHES
     if len(switch) > MOST:
         raise SystemExit(f"--switch: {len(switch)} settings; give {MOST} at most")
-    families, commit, found, tree = all_families(data), parent or parent_commit(), [], switchable()
+    families, commit, found, tree = chosen(all_families(data), only), parent or parent_commit(), [], switchable()
     for half, signs in enumerate((hadamard(len(switch)), -hadamard(len(switch)))):
         words = [",".join(key for key, sign in zip(switch, row, strict=True) if sign > 0) for row in signs]
         states = [stated(f"{tree}:{filter}:{one}") for one in words]
@@ -106,7 +114,7 @@ def run(_build: Path, switch: Sequence[str], filter: str, runs: int, data: Path 
     summary = by_part(families, found, switch)
     for setting, parts in summary.items():
         print(f"with {setting} less without it, +- two standard errors\n{against(parts)}")
-    if switch == SWITCHES:
+    if switch == SWITCHES and not only:
         store.write_result("nav_worth", {"draws_of": commit, "draws": len(found), "settings": summary})
 
 
@@ -115,6 +123,4 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--switch", action="append", default=[], metavar="KEY=VALUE", help=f"up to {MOST} (default: {SWITCHES})"
     )
     parser.add_argument("--filter", default="adaptive", help="(default: %(default)s)")
-    parser.add_argument("--runs", type=int, default=430, help="draws of all families together (default: %(default)s)")
-    recordings_option(parser)
-    parser.add_argument("--parent", metavar="COMMIT", help="whose draws; default: the parent of what is measured")
+    draw_options(parser, 430)
