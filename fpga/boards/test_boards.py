@@ -138,6 +138,12 @@ def test_the_bridge_synthesises_clean_with_one_clock(tmp_path):
     assert {cell["parameters"]["SRMODE"] for cell in pads} == {"LSR_OVER_CE"}
 
 
+def test_what_is_generated_does_not_tell_where(tmp_path):
+    """Else a commit built in two folders is two bitstreams."""
+    for made in (build.generate_usb(tmp_path, build.load("ulx3s")), build.generate_fs_phy(tmp_path)):
+        assert ".py:" not in made.read_text()
+
+
 def test_a_second_clock_is_noticed(tmp_path):
     cells = {f"ff{n}": {"type": "TRELLIS_FF", "connections": {"CLK": [n]}} for n in (2, 3, 4)}
     cells["own"] = {"type": "OSCG", "connections": {"OSC": [4]}}  # the FPGA's oscillator clocks the watchdog

@@ -85,7 +85,7 @@ def generate() -> str:
     usb.clk.name, usb.rst.name, fast.clk.name, fast.rst.name = "clk", "rst", "clk_48", "rst_48"
     top.submodules.phy = phy = FullSpeedPhy()
     ports = [usb.clk, usb.rst, fast.clk, fast.rst, *phy.ports()]
-    return NOTICE + verilog.convert(top, name="whisker_fs_phy", ports=ports, strip_internal_attrs=True)
+    return NOTICE + verilog.convert(top, name="whisker_fs_phy", ports=ports, strip_internal_attrs=True, emit_src=False)
 
 
 def main() -> None:

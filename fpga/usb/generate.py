@@ -165,7 +165,7 @@ def generate(build: Build) -> str:
     domain.clk.name, domain.rst.name = "clk", "rst"
     top.submodules.usb = usb = WhiskerUsb(build)
     ports = [domain.clk, domain.rst, *usb.ports()]
-    return NOTICE + verilog.convert(top, name="whisker_usb", ports=ports, strip_internal_attrs=True)
+    return NOTICE + verilog.convert(top, name="whisker_usb", ports=ports, strip_internal_attrs=True, emit_src=False)
 
 
 def usb_id(text: str) -> tuple[int, int]:
