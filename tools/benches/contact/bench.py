@@ -15,7 +15,7 @@ from .. import store
 from .measure import BLOCK, CASES, FIRST_S, contact, drawn, first_touch, true_motion
 from .scenes import FRICTION, TICK_S, chained
 
-CONTACTS, WORD = 20, "judged"
+CONTACTS, WORD = 40, "judged"
 PROCESSORS = 2
 STORED = (
     "ellipse",
