@@ -26,7 +26,7 @@ from crunchbot_lab.scenes.making import ROW_S
 
 from .. import store
 from ..host.bench import ATOM_HZ
-from .families import chosen, draw_options, measure, parent_commit, seed_of, summed_up
+from .families import chosen, draw_options, measure, parent_commit, report, seed_of, summed_up
 from .states import stated
 from .worlds import all_families
 
@@ -90,6 +90,9 @@ def run(
         known = stated(one)
         draws = measure(families, runs, commit, [known])
         found[name] = summed_up(families, draws, [known])[known.words]
+        print(report({name: found[name]}), flush=True)
+    if only:  # the page shows all
+        return
     seed = seed_of(commit, COUNTED, 0)
     states = {
         name: parts["all"]
