@@ -34,8 +34,8 @@ ONCE = (
 BEGIN = (
     "sha256sum --check --ignore-missing SHA256SUMS",
     "python3 -m venv ~/whisker && . ~/whisker/bin/activate",
-    "pip install --find-links . 'crunchbot[view]' && whisker try",
-    "pip install --find-links . 'crunchbot[lab]' && whisker robot --simulated --desktop",
+    "pip install --no-compile --find-links . 'crunchbot[view]' && whisker try",
+    "pip install --no-compile --find-links . 'crunchbot[lab]' && whisker robot --simulated --desktop",
 )
 # Each file by its name's pattern: whose it is. A file that fits none fails the tool.
 ABOUT = {
