@@ -41,11 +41,11 @@ FORCE_MOST_RAD = 2.85  # of a force on the tip in the beam's table (contact_beam
 NINETY = 1.645  # standard deviations to the ends of a 90 % interval
 MOTIONS = ("body whisk", "drive-by", "sweep")
 SURE = 0.9  # probability from which on something is said: a tip on a surface, a corner
-# Deviations up to which something is sure. In 118 contacts of chains regions of places held in 91 % of the reports up to 6 mm (n
-# 1477) and in 14 % above (n 36): their hypotheses lie apart. Normals above 10 degrees were 15 off in the median (n 49).
 # In 60 simulated contacts of a corner that moves, 11 of 181 reports before this way had small deviations, and 1 of the 11
 # regions held; after it 526 of 539, and 98 % held.
 CHANGED_LEAST_M = 5e-4
+# Deviations up to which something is sure. In 118 contacts of chains regions of places held in 91 % of the reports up to 6 mm (n
+# 1477) and in 14 % above (n 36): their hypotheses lie apart. Normals above 10 degrees were 15 off in the median (n 49).
 POINT_MOST_M, NORMAL_MOST_RAD = 0.006, float(np.radians(10.0))
 
 
