@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "calibration.h"
 #include "expected.h"
 #include "filter.h"
 #include "gaussian.h"
@@ -32,11 +31,9 @@ struct grid {
     struct nav_layer layer;     /* this */
     struct nav_pending pending; /* since the last update */
     struct nav_pose mean;       /* near the mode, at the last update */
-    double near;                /* before the present row: from SURE on it judges its readings, and the odometry */
+    double near;                /* before the present row: from SURE on it judges its readings */
     bool sure;
     long unhazarded; /* rows read since the hazard was last given */
-    struct nav_calibration calibration;
-    struct nav_motion last; /* motion of the row before, as applied */
 };
 
 static void grid_destroy(void *self)
@@ -192,7 +189,6 @@ static void *grid_create(const struct nav_problem *problem)
     if (!g)
         return NULL;
     g->problem = problem;
-    nav_calibration_init(&g->calibration);
     struct nav_cell cell;
     bool found = grid_find_cell(g, &cell) == 0;
     cell.heading = s->grid.cell_deg > 0.0 ? s->grid.cell_deg * NAV_PI / 180.0 : cell.heading;
@@ -208,19 +204,6 @@ static void *grid_create(const struct nav_problem *problem)
     return g;
 }
 
-static void grid_estimate(const void *self, struct nav_estimate *out);
-
-/* The motion as the odometry's learned errors correct it. What is learned comes from the rows before. */
-static struct nav_motion grid_calibrated(struct grid *g, const struct nav_motion *motion)
-{
-    struct nav_estimate now;
-    grid_estimate(g, &now);
-    now.confidence = g->near;
-    nav_calibration_learn(&g->calibration, &g->last, &now);
-    g->last = nav_calibration_apply(&g->calibration, motion);
-    return g->last;
-}
-
 /* NAV_CARRIED of the belief is anywhere: what every cell then gets is added in a pass without a likelihood. */
 static void grid_carry(struct grid *g)
 {
@@ -232,16 +215,15 @@ static void grid_carry(struct grid *g)
     g->near *= 1.0 - NAV_CARRIED;
 }
 
-static void grid_predict(void *self, const struct nav_motion *reported)
+static void grid_predict(void *self, const struct nav_motion *motion)
 {
     struct grid *g = self;
     if (g->pending.noise.position > 0.0) /* nothing was read in the row before */
         g->near = nav_histogram_within(&g->histogram, &g->pending, nav_compose(g->mean, g->pending.step));
-    struct nav_motion motion = grid_calibrated(g, reported);
-    struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, &motion);
-    noise.position += nav_histogram_fan(&g->histogram, motion.step, g->problem->settings.motion.along_m);
-    nav_pending_add(&g->pending, motion.step, noise);
-    if (reported->carried)
+    struct nav_noise noise = nav_motion_noise(&g->problem->robot, &g->problem->settings, motion);
+    noise.position += nav_histogram_fan(&g->histogram, motion->step, g->problem->settings.motion.along_m);
+    nav_pending_add(&g->pending, motion->step, noise);
+    if (motion->carried)
         grid_carry(g);
 }
 

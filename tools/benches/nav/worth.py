@@ -2,7 +2,7 @@
 
     tools/benches nav_worth --runs 430 --data DIR                                      the mechanisms of `adaptive`
     tools/benches nav_worth --switch worth.budget=0                                    one alone
-    tools/benches nav_worth --filter grid --switch worth.calibration=0                 of another filter
+    tools/benches nav_worth --filter grid --switch worth.trust=0                       of another filter
 
 The filters have no such settings: the bench compiles a copy of this tree that has them, by the patch beside it.
 On each draw as many states run as a Hadamard matrix has rows; a setting's worth is what the states that have it differ by
