@@ -70,7 +70,7 @@ static bool filter_touched(struct nav_contact_filter *f, double mean, bool touch
     f->side = touched ? side : 0.0;
     if (!again) {
         f->before = fabs(mean);
-        f->rate = f->ring = 0.0;
+        f->rate = f->ring = f->jumps = 0.0;
     }
     return again;
 }
