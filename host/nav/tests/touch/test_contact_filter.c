@@ -464,6 +464,23 @@ static void what_no_hypothesis_explains_is_none_of_them(void **state)
     assert_true(a.other > 0.5 && a.tip < 0.5);
 }
 
+/* The plug has come to rest when it is touched. */
+static void a_base_that_shook_before_the_touch_leaves_no_ringing(void **state)
+{
+    (void)state;
+    struct nav_contact_filter calm = filter(), shaken = filter();
+    uint32_t seed = 37;
+    for (int i = 0; i < 300; i++) {
+        const double shake = i >= 160 ? 0.0 : i % 2 ? 0.1 : -0.1, touched = fmax(0.0, (i - 200) * TICK);
+        const double still[3] = {0.0, -0.05, 0.0}, shakes[3] = {shake, -0.05, 0.0};
+        const double felt[2] = {0.3 * touched + NOISE * noise(&seed), 0.0};
+        nav_contact_filter_update(&calm, still, felt, true);
+        nav_contact_filter_update(&shaken, shakes, felt, true);
+    }
+    assert_true(calm.parts > 0);
+    assert_near(shaken.ring, calm.ring, 0.0);
+}
+
 /* A corner under the shaft is pressed, let go and pressed again 3 mm on; the gap between says nothing new of it. */
 static void an_object_is_followed_over_a_gap(void **state)
 {
@@ -568,6 +585,7 @@ int main(void)
         cmocka_unit_test(a_tip_that_chatters_rubs_either_way_while_it_slides_outwards),
         cmocka_unit_test(the_part_of_a_hypothesis_beyond_the_tip_goes_over_to_the_shaft),
         cmocka_unit_test(what_no_hypothesis_explains_is_none_of_them),
+        cmocka_unit_test(a_base_that_shook_before_the_touch_leaves_no_ringing),
         cmocka_unit_test(an_object_is_followed_over_a_gap),
         cmocka_unit_test(a_corner_that_goes_along_with_the_shaft_is_caught),
         cmocka_unit_test(the_share_of_a_push_along_the_whisker_is_reported),
