@@ -137,6 +137,8 @@ def test_a_peers_own_error_is_found(tmp_path):
     assert store.failure(["cc", tmp_path / "a.c", "-o", tmp_path / "a"]) == ""
     assert "-lbsd-not-there" in store.failure(["cc", tmp_path / "a.c", "-lbsd-not-there", "-o", tmp_path / "a"])
     assert "nothing" in store.failure(["true"], ["cc", tmp_path / "b.c", "-o", tmp_path / "b"])
+    rust = "error: linking with `cc` failed\\n  = note: rust-lld: error: unable to find library -lbsd\\n"
+    assert "-lbsd" in store.failure(["python3", "-c", f"print('{rust}'); exit(1)"])
 
 
 def test_a_measurement_is_whole_or_not_there(tmp_path):

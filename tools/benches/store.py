@@ -58,7 +58,7 @@ COMMAND_OF_CHART = {name: command for command, (_, charts) in MAKES.items() for 
 
 
 WIDTH = 400  # of a line of a result, at most, where it has parts
-ERROR, LINKER = re.compile(r"\berror\b|cannot find|not found", re.IGNORECASE), re.compile(r"\bld: ")
+ERROR, LINKER = re.compile(r"\berror\b|cannot find|not found", re.IGNORECASE), re.compile(r"\bl?ld: ")
 
 
 @cache

@@ -5,6 +5,7 @@ import tomllib
 
 from crunchbot_lab.report.share import wilson
 
+from ..host.ring import PEERS
 from ..store import COMMAND_OF_RESULT, ORIGINS, RESULTS, ROOT, read_result
 from ..tables import cell, table
 
@@ -24,9 +25,11 @@ def fields(result: str) -> dict:
     if result == "ring":
         polling = {"mode": "poll", "pace": "2khz", "readers": 1}
         rows = {row["peer"]: row["latency_us"] for row in data["rows"] if polling.items() <= row.items()}
+        others = sorted((row["p50"], PEERS[peer][0]) for peer, row in rows.items() if peer not in ("whisker", "memory"))
         return {peer: row["p50"] for peer, row in rows.items()} | {
             "rounds": data["rounds"],
             "slow": rows["whisker"]["p99"],
+            "fastest": "; ".join(f"{title}: {p50:.2f}" for p50, title in others[:2]) or "no peer",
         }
     if result == "usb_soak":
         return data | {"bad": sum(data[key] for key in ("gaps", "duplicates", "wrong", "stale"))}
