@@ -117,7 +117,8 @@ static void orders_account(struct base_robot *robot, int64_t now_ms)
 
 struct create_ordered base_orders_take(struct base_robot *robot, int64_t now_ms)
 {
-    orders_account(robot, now_ms);
+    const int64_t frames_ms = robot->ordered_ms + (int64_t)(robot->frame.missed + 1) * CREATE_OI_PERIOD_MS;
+    orders_account(robot, robot->options->stream_clock ? frames_ms : now_ms);
     struct create_ordered ordered = robot->ordered;
     /* A plug that is loose cuts both wires: of several requests it was the last that was heard. */
     ordered.heard = base_orders_heard(robot) && robot->unheard_requests < 2;
@@ -140,7 +141,8 @@ static void orders_flush_wheels(struct base_robot *robot, int64_t now_ms)
         return;
     }
     if (robot->speeds.left_mm_s != robot->written.left_mm_s || robot->speeds.right_mm_s != robot->written.right_mm_s) {
-        orders_account(robot, now_ms);
+        /* In lock-step simulation time passes with frames alone. */
+        orders_account(robot, robot->options->stream_clock ? robot->ordered_ms : now_ms);
         robot->ordered.changed = true;
     }
     robot->written = robot->speeds;
