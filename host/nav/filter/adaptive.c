@@ -227,7 +227,11 @@ static void adaptive_draw_particles(struct adaptive *a, double share)
     const struct nav_settings *s = &a->problem->settings;
     double count = fmin(fmax(s->adaptive.least, a->global.crowd * ADAPTIVE_PER_BIN), a->global.room / 2.0);
     struct nav_particles *set = &a->cloud.set;
-    long held = a->local ? set->count : 0;
+    long held = a->local ? set->count : 0, left = set->room - (long)count;
+    if (held > left) { /* a full cloud would have no room for what was found */
+        held = left;
+        nav_particles_resample(set, held, nav_rng_uniform(&a->cloud.rng));
+    }
     set->count = held;
     nav_particles_scale(set, 1.0 - share);
     adaptive_global_draw(&a->global, set, &a->cloud.rng, (long)count, share, adaptive_ahead(a));
