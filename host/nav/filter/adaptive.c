@@ -380,11 +380,12 @@ static double adaptive_take_cloud(struct adaptive *a)
     return local;
 }
 
-static void adaptive_doubt(struct adaptive *a, double local)
+static void adaptive_doubt(struct adaptive *a, const double *moved, double local)
 {
     uint64_t row = a->log.head - 1;
+    double anywhere = adaptive_kidnap_anywhere(&a->kidnap, a->likelihood, moved);
     adaptive_log_entry(&a->log, row)->local = local;
-    adaptive_kidnap_take(&a->kidnap, a->likelihood, row, adaptive_kidnap_anywhere(&a->kidnap, a->likelihood), local);
+    adaptive_kidnap_take(&a->kidnap, a->likelihood, row, anywhere, local);
 }
 
 static void adaptive_learn(struct adaptive *a)
@@ -426,10 +427,10 @@ static void adaptive_update(void *self, const struct nav_evidence *evidence)
     adaptive_hand_over(a);      /* motion unknown, poses too many for a cloud: to the histogram */
     adaptive_read(a, evidence); /* 3: likelihoods of the readings by what may be expected */
     if (a->local) {
-        double local = adaptive_take_cloud(a); /* 2, 1: moves and weighs the cloud */
-        adaptive_doubt(a, local);              /* 5: odds of a kidnap, by "anywhere" */
-        adaptive_learn(a);                     /* 4: trust, and where the map is wrong */
-        adaptive_resample(a, false);           /* as many hypotheses as the cloud's spread asks for */
+        double local = adaptive_take_cloud(a);     /* 2, 1: moves and weighs the cloud */
+        adaptive_doubt(a, evidence->moved, local); /* 5: odds of a kidnap, by "anywhere" */
+        adaptive_learn(a);                         /* 4: trust, and where the map is wrong */
+        adaptive_resample(a, false);               /* as many hypotheses as the cloud's spread asks for */
     }
     if (a->awake)
         adaptive_search(a); /* 1 to 3, 5: the same of the histogram */

@@ -19,6 +19,24 @@ static struct nav_pose kidnap_draw(const struct nav_likelihood *l, struct nav_rn
     return pose;
 }
 
+/* States of what a sensor meets: textures; nothing and something within reach. A sensor of another kind meets another
+ * thing each time: one state. */
+static int kidnap_states(const struct nav_model *model)
+{
+    return model->kind->floor ? model->codes : model->kind->distance ? 2 : 1;
+}
+
+static int kidnap_state(const struct nav_model *model, int code)
+{
+    return model->kind->floor ? code : model->kind->distance ? code < model->codes - 2 : 0;
+}
+
+/* Path over which one thing stays at a sensor, as where nothing is mapped (likelihood.c). */
+static double kidnap_run_m(const struct nav_likelihood *l, int w)
+{
+    return l->model[w].kind->floor ? NAV_PI * l->arena->tile / 4.0 : l->model[w].length;
+}
+
 static void kidnap_count(struct adaptive_kidnap *d, struct nav_likelihood *l, struct nav_rng *rng)
 {
     for (int n = 0; n < POSES; n++) {
@@ -27,22 +45,27 @@ static void kidnap_count(struct adaptive_kidnap *d, struct nav_likelihood *l, st
         for (int w = 0; w < d->whiskers; w++)
             d->share[w][l->scratch[w]] += 1.0f / POSES;
     }
+    for (int w = 0; w < d->whiskers; w++) {
+        for (int k = 0; k < l->model[w].codes; k++)
+            nav_unmapped_count(&d->any[w], kidnap_state(&l->model[w], k), (double)d->share[w][k]);
+    }
 }
 
 int adaptive_kidnap_init(struct adaptive_kidnap *d, struct nav_likelihood *l, struct nav_rng *rng)
 {
     *d = (struct adaptive_kidnap){.whiskers = l->whiskers};
     d->share = calloc((size_t)l->whiskers + 1, sizeof *d->share);
+    d->any = calloc((size_t)l->whiskers + 1, sizeof *d->any);
     d->trust = calloc((size_t)l->whiskers + 1, sizeof *d->trust);
-    for (int w = 0; d->share && w < l->whiskers; w++) {
+    for (int w = 0; d->share && d->any && w < l->whiskers; w++) {
         d->share[w] = calloc((size_t)l->model[w].codes, sizeof **d->share);
-        if (!d->share[w])
+        if (!d->share[w] || nav_unmapped_init(&d->any[w], kidnap_states(&l->model[w])))
             return -1;
     }
-    if (!d->share || !d->trust)
+    if (!d->share || !d->any || !d->trust)
         return -1;
-    adaptive_kidnap_clear(d, l, 0);
     kidnap_count(d, l, rng);
+    adaptive_kidnap_clear(d, l, 0);
     return 0;
 }
 
@@ -50,22 +73,38 @@ void adaptive_kidnap_free(struct adaptive_kidnap *d)
 {
     for (int w = 0; d->share && w < d->whiskers; w++)
         free(d->share[w]);
+    for (int w = 0; d->any && w < d->whiskers; w++)
+        nav_unmapped_free(&d->any[w]);
     free(d->share);
+    free(d->any);
     free(d->trust);
 }
 
-double adaptive_kidnap_anywhere(const struct adaptive_kidnap *d, const struct nav_likelihood *l)
+/* Log-likelihoods of the reading by state: the mean of its codes, as often as they are met. */
+static void kidnap_read(const struct adaptive_kidnap *d, const struct nav_likelihood *l, int w)
+{
+    const struct nav_model *model = &l->model[w];
+    struct nav_unmapped *any = &d->any[w];
+    for (int k = 0; k < any->states; k++)
+        any->loglik[k] = 0.0;
+    for (int k = 0; k < model->codes; k++) {
+        if (d->share[w][k] > 0.0f) /* ratios to a broken whisker */
+            any->loglik[kidnap_state(model, k)] += (double)d->share[w][k] * l->ratio[w][k];
+    }
+    for (int k = 0; k < any->states; k++) {
+        double ratio = any->share[k] > 0.0 ? any->loglik[k] / any->share[k] : 1.0;
+        any->loglik[k] = l->weight[w] * log(d->trust[w] * ratio + 1.0 - d->trust[w]);
+    }
+}
+
+double adaptive_kidnap_anywhere(struct adaptive_kidnap *d, const struct nav_likelihood *l, const double *moved)
 {
     double sum = 0.0;
     for (int w = 0; w < d->whiskers; w++) {
         if (!(l->weight[w] > 0.0))
             continue;
-        double ratio = 0.0; /* to a broken whisker */
-        for (int k = 0; k < l->model[w].codes; k++) {
-            if (d->share[w][k] > 0.0f)
-                ratio += (double)d->share[w][k] * l->ratio[w][k];
-        }
-        sum += l->weight[w] * log(d->trust[w] * ratio + 1.0 - d->trust[w]);
+        kidnap_read(d, l, w);
+        sum += nav_unmapped_take(&d->any[w], moved[w]);
     }
     return sum;
 }
@@ -83,8 +122,10 @@ void adaptive_kidnap_clear(struct adaptive_kidnap *d, const struct nav_likelihoo
 {
     d->ratio = 0.0;
     d->since = row;
-    for (int w = 0; w < d->whiskers; w++)
+    for (int w = 0; w < d->whiskers; w++) {
         d->trust[w] = l->trust[w].working;
+        nav_unmapped_begin(&d->any[w], kidnap_run_m(l, w));
+    }
 }
 
 void adaptive_kidnap_teach(const struct adaptive_kidnap *d, const struct nav_likelihood *from,

@@ -20,11 +20,9 @@ static int likelihood_unmapped(struct nav_likelihood *l, int w)
     const struct nav_arena *arena = l->arena;
     const struct nav_model *model = &l->model[w];
     struct nav_unmapped *u = &l->unmapped[w];
-    u->states = model->kind->floor ? model->codes - 1 : model->kind->distance && arena->unknown > 0 ? 2 : 0;
-    u->share = calloc((size_t)u->states + 1, sizeof *u->share);
-    u->now = calloc((size_t)u->states + 1, sizeof *u->now);
-    u->loglik = calloc((size_t)u->states + 1, sizeof *u->loglik);
-    if (!u->share || !u->now || !u->loglik)
+    if (nav_unmapped_init(u, model->kind->floor                            ? model->codes - 1
+                             : model->kind->distance && arena->unknown > 0 ? 2
+                                                                           : 0))
         return -1;
     for (int k = 0; k < u->states; k++)
         nav_unmapped_count(u, k, 1.0); /* each as if seen once more */
@@ -119,11 +117,8 @@ void nav_likelihood_free(struct nav_likelihood *l)
         free(l->ratio ? l->ratio[w] : NULL);
         if (l->trust)
             nav_trust_free(&l->trust[w]);
-        if (l->unmapped) {
-            free(l->unmapped[w].share);
-            free(l->unmapped[w].now);
-            free(l->unmapped[w].loglik);
-        }
+        if (l->unmapped)
+            nav_unmapped_free(&l->unmapped[w]);
     }
     nav_sensors_free(&l->sensors);
     nav_obstacles_free(&l->obstacles);
@@ -161,7 +156,7 @@ static void likelihood_read_unknown(struct nav_likelihood *l, int w, const struc
                 model->kind->distance
                     ? likelihood_log(l, w, nav_range_unmapped(model, evidence->reading[w][0], k == SOMETHING))
                     : (double)l->table[w][k];
-        l->unknown[w] = nav_unmapped_take(u, evidence->moved ? evidence->moved[w] : (double)INFINITY, u->loglik);
+        l->unknown[w] = nav_unmapped_take(u, evidence->moved ? evidence->moved[w] : (double)INFINITY);
     }
     l->table[w][model->codes - 1] = (float)l->unknown[w];
     l->ratio[w][model->codes - 1] = fmax((exp(l->unknown[w] / l->weight[w]) - (1.0 - trust)) / trust, 0.0);

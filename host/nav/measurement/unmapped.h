@@ -8,12 +8,18 @@
 
 #include "sensing.h"
 
+/* 0, or -1 without memory; nav_unmapped_free either way. */
+int nav_unmapped_init(struct nav_unmapped *, int states);
+void nav_unmapped_free(struct nav_unmapped *);
+
 /* Adds `weight` to the share that one of a sensor's states has of the map; nav_unmapped_begin makes shares of them. */
 void nav_unmapped_count(struct nav_unmapped *, int state, double weight);
+
+/* Nothing was read yet, or what was read is of another place. */
 void nav_unmapped_begin(struct nav_unmapped *, double run_m);
 
-/* Logarithm of p(reading | the readings before it, ground not mapped), after `moved` m of path since the last one;
- * loglik[states]: of the reading by each state. */
-double nav_unmapped_take(struct nav_unmapped *, double moved, const double *loglik);
+/* Logarithm of p(reading | the readings before it, ground not mapped), after `moved` m of path since the last one; in
+ * u->loglik: of the reading by each state. */
+double nav_unmapped_take(struct nav_unmapped *u, double moved);
 
 #endif

@@ -1,10 +1,48 @@
-/* The adaptive filter after a kidnap: what a search has found is kept, however full the cloud is. */
-#include "filter.h"
+/* The adaptive filter's test of a kidnap: what a robot anywhere would read, and that what a search finds is kept. */
+#include "adaptive_kidnap.h"
 
+#include "filter.h"
 #include "near.h"
 #include "wander.h"
 
 enum { PRINTED = 30 };
+
+/* Log-likelihood anywhere of a window of one tip that speaks for the first class. */
+static double read_again(struct adaptive_kidnap *d, struct nav_likelihood *l, double moved)
+{
+    const double window[WANDER_CLASSES] = {log(0.8), log(0.1), log(0.1)}, nowhere = INFINITY;
+    const double *reading[WANDER_TIPS + WANDER_RAYS] = {window, window, &nowhere, &nowhere, &nowhere};
+    const double weight[WANDER_TIPS + WANDER_RAYS] = {1.0}, path[WANDER_TIPS + WANDER_RAYS] = {moved};
+    nav_likelihood_read(l, &(struct nav_evidence){.reading = reading, .weight = weight, .moved = path});
+    return adaptive_kidnap_anywhere(d, l, path);
+}
+
+static void what_is_met_anywhere_stays_for_a_while(void **state)
+{
+    (void)state;
+    struct wander w = wander_new(1);
+    struct nav_rng rng;
+    struct adaptive_kidnap d;
+    struct nav_likelihood *l = nav_likelihood_new(&w.problem.arena, &w.problem.robot, &w.problem.settings, 0.0);
+    nav_rng_seed(&rng, 1, 0);
+    assert_int_equal(adaptive_kidnap_init(&d, l, &rng), 0);
+    double first = read_again(&d, l, INFINITY);
+    double again = read_again(&d, l, 0.0);
+    double sum = 0.0, square = 0.0; /* the forward algorithm by hand, for a state that stays */
+    for (int k = 0; k < WANDER_CLASSES; k++) {
+        double p = d.trust[0] * l->ratio[0][k] + 1.0 - d.trust[0];
+        sum += d.any[0].share[k] * p;
+        square += d.any[0].share[k] * p * p;
+    }
+    assert_near(first, log(sum), 1e-6);
+    assert_near(again, log(square / sum), 1e-6);
+    assert_true(again > first + 0.2);
+    assert_near(read_again(&d, l, 1e9), first, 1e-6); /* far off it is another draw */
+    adaptive_kidnap_clear(&d, l, 1);
+    assert_near(read_again(&d, l, 0.0), first, 1e-6); /* as in another place */
+    adaptive_kidnap_free(&d);
+    nav_likelihood_free(l);
+}
 
 /* A floor of black and white cells of 5 cm, and no walls in reach: any place fits for a while. */
 static struct wander printed(uint64_t seed, uint8_t floor[PRINTED * PRINTED])
@@ -54,6 +92,7 @@ static void a_robot_carried_over_a_printed_floor_is_found_and_kept(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_met_anywhere_stays_for_a_while),
         cmocka_unit_test(a_robot_carried_over_a_printed_floor_is_found_and_kept),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
