@@ -104,15 +104,19 @@ void nav_particles_masses(const struct nav_particles *p, double *mass, int modes
     }
 }
 
+static double moments_factor(const struct nav_particles *p, long i, const double *factor, int modes)
+{
+    int mode = (int)p->mode[i];
+    return mode >= 0 && mode < modes ? factor[mode] : 1.0;
+}
+
 void nav_particles_weigh_modes(struct nav_particles *p, const double *factor, int modes)
 {
     double total = 0.0;
-    for (long i = 0; i < p->count; i++) {
-        int mode = (int)p->mode[i];
-        p->weight[i] *= mode >= 0 && mode < modes ? (float)factor[mode] : 1.0f;
-        total += (double)p->weight[i];
-    }
-    nav_particles_scale(p, 1.0 / total);
+    for (long i = 0; i < p->count; i++)
+        total += (double)p->weight[i] * moments_factor(p, i, factor, modes);
+    for (long i = 0; i < p->count && total > 0.0; i++)
+        p->weight[i] = (float)((double)p->weight[i] * moments_factor(p, i, factor, modes) / total);
 }
 
 /* One particle as a component, its mass alone left open: the kernel's width is the normal reference rule's, on what is

@@ -75,7 +75,8 @@ int nav_particles_modes(struct nav_particles *, struct nav_mode mode[NAV_MODES_M
 /* What each mode last gathered weighs now: mass[modes]. */
 void nav_particles_masses(const struct nav_particles *, double *mass, int modes);
 
-/* Multiplies the weights of each mode last gathered by its factor; normalises. */
+/* Multiplies the weights of each mode last gathered by its factor; normalises. Where no weight would be left they stay
+ * as they are. */
 void nav_particles_weigh_modes(struct nav_particles *, const double *factor, int modes);
 
 /* The particles moved by what is pending, as nav_filter_components lists them, masses times `mass`. about: pose near

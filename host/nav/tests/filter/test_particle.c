@@ -375,6 +375,13 @@ static void two_places_are_two_modes(void **state)
         assert_near(found[m].mean.x, left ? 0.2 : 0.8, 0.006);
         assert_near(mass[m], left ? 0.7 : 0.3, 1e-5);
     }
+    const double one[] = {1e30, 0.0}, none[] = {0.0, 0.0};
+    for (int n = 0; n < 2; n++) { /* the second time nothing would be left: it stays */
+        nav_particles_weigh_modes(&set, n == 0 ? one : none, 2);
+        nav_particles_masses(&set, mass, 2);
+        assert_near(mass[0], 1.0, 1e-5);
+        assert_near(mass[1], 0.0, 0.0);
+    }
     nav_particles_free(&set);
 }
 
