@@ -53,6 +53,7 @@ int main(int argc, char **argv)
         return run(options);
     } catch (const std::exception &error) {
         std::fprintf(stderr, "%s: %s\n", bridge_sim::PROGRAM, error.what());
+        std::fflush(nullptr);
         std::_Exit(FAILED); // a client in the midst of an ioctl has crashed umockdev's exit handlers
     }
 }
