@@ -4,7 +4,6 @@ import csv
 import math
 import os
 import subprocess
-import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -58,11 +57,10 @@ def driver(folder: Path, model: int):
             yield base
 
 
-def drive(link: SimLink, base: Base, blocks: int, course, pause_s: float) -> list:
-    """Answers every block by the course, after a pause; what the base said each time."""
+def drive(link: SimLink, base: Base, blocks: int) -> list:
+    """Answers every block by the course; what the base said each time."""
     reported = []
     for block in range(blocks):
-        time.sleep(pause_s)
         tick = (block + 1) * BLOCK_TICKS - 1
         after = link.bytes_sent(tick)
         if after is None:
@@ -74,7 +72,7 @@ def drive(link: SimLink, base: Base, blocks: int, course, pause_s: float) -> lis
     return reported
 
 
-def run(folder: Path, model: int, *options, course=course, pause_s=0.0) -> tuple[list, list[dict]]:
+def run(folder: Path, model: int, *options) -> tuple[list, list[dict]]:
     """What the driver said block by block, and the true path."""
     folder.mkdir()
     (folder / "scene.flat").write_text(SCENE)
@@ -83,7 +81,7 @@ def run(folder: Path, model: int, *options, course=course, pause_s=0.0) -> tuple
     ring = f"whisker-test-base-{os.getpid()}"
     command = simulation(folder, folder / "scene.flat", SECONDS, 3, ring, *words, link=FAST_LINK)
     with running(command) as process, connect(folder / "sock", process) as link, driver(folder, model) as base:
-        reported = drive(link, base, round(SECONDS * TICKS_PER_S / BLOCK_TICKS), course, pause_s)
+        reported = drive(link, base, round(SECONDS * TICKS_PER_S / BLOCK_TICKS))
         assert process.wait(END_S) == 0, process.stderr.read()
     with (folder / "truth.csv").open() as file:
         return reported, list(csv.DictReader(file))
@@ -92,15 +90,6 @@ def run(folder: Path, model: int, *options, course=course, pause_s=0.0) -> tuple
 @pytest.mark.parametrize("options", [(), ("--create-lose-bytes", 0.01, "--create-drop-remainder")])
 def test_the_same_seed_gives_the_same_odometry_to_the_last_bit(tmp_path, options):
     assert run(tmp_path / "one", 1, *options) == run(tmp_path / "two", 1, *options)
-
-
-def test_odometry_over_lost_frames_counts_simulated_time_not_that_of_the_machine(tmp_path):
-    def restless(block: int) -> tuple[float, float]:  # other speeds in each frame that is lost
-        return (0.1 + 0.1 * (block % 2), 0.0)
-
-    lossy = ("--create-lose-bytes", 0.01)
-    quick = run(tmp_path / "quick", 1, *lossy, course=restless)
-    assert run(tmp_path / "slow", 1, *lossy, course=restless, pause_s=0.01) == quick
 
 
 @pytest.mark.parametrize("model", [1, 2])

@@ -1,6 +1,8 @@
 /* Who may command, who has a place, what is logged of it; and what holds the wheels. */
 #include "base_rig.h"
 
+#include <math.h>
+
 #define OPENED_MS 1000
 #define MANY (BASE_CLIENTS + 1)
 
@@ -296,6 +298,24 @@ static void clients_that_come_and_go_fill_no_log(void **state)
     assert_in_range(log_lines, 1, BASE_LOG_LINES);
 }
 
+/* A frame is lost beside an order for other speeds: what was ordered over it is two frames' time, on any machine. */
+static void in_lock_step_what_was_ordered_counts_frames_not_the_machines_time(void **state)
+{
+    (void)state;
+    const uint8_t lost[CREATE_STREAM_BYTES] = {0};
+    int64_t now_ms = OPENED_MS;
+    for (int64_t pause_ms = 0; pause_ms <= 200; pause_ms += 100) {
+        base_robot_drive(&robot, 0.1, 0.0, now_ms);
+        report_frame(100, 1, now_ms += pause_ms);
+        base_robot_drive(&robot, 0.2, 0.0, now_ms += pause_ms);
+        assert_int_equal(send(line, lost, robot.stream.length, 0), robot.stream.length);
+        report_frame(200, 3, now_ms += pause_ms);
+        assert_int_equal(robot.frame.missed, 1);
+        assert_true(robot.frame.ordered.changed);
+        assert_int_equal(lround(robot.frame.ordered.distance * 1e6), lround(0.2 * 2 * 1e3 * CREATE_OI_PERIOD_MS));
+    }
+}
+
 #define WALL(test) cmocka_unit_test_setup_teardown(test, begin, end)
 #define STREAM(test) cmocka_unit_test_setup_teardown(test, begin_by_stream, end)
 
@@ -305,6 +325,7 @@ int main(void)
         WALL(a_silent_commander_loses_the_command_to_the_next_that_drives),
         WALL(a_commander_that_orders_keeps_the_command),
         STREAM(by_the_streams_clock_frames_count),
+        STREAM(in_lock_step_what_was_ordered_counts_frames_not_the_machines_time),
         WALL(who_has_said_nothing_loses_its_place_to_a_new_client),
         WALL(who_has_said_nonsense_loses_its_place_at_once),
         WALL(who_has_spoken_of_late_keeps_its_place),
